@@ -1,0 +1,1 @@
+"""Form factors between patches, as sparse rows, by three estimators behind one interface."""

@@ -1,0 +1,134 @@
+"""What is baked, as plain arrays: triangles, surfaces, lamps and the sky.
+
+Lengths are metres, directions unit vectors, and all light is scene-linear RGB. Nothing here knows Blender: the scene
+reader of the add-on fills these classes in, and a test or another program can do the same by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float32 = NDArray[np.float32]
+Float64 = NDArray[np.float64]
+Int32 = NDArray[np.int32]
+Bool = NDArray[np.bool_]
+RGB = tuple[float, float, float]
+Vector = tuple[float, float, float]
+
+#: A constant emitter or reflector is refused above this albedo: light in a closed room would never die.
+ALBEDO_LIMIT = 0.9999
+
+
+class SceneError(ValueError):
+    """The scene cannot be baked as it is. The message names the thing and the remedy."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A diffuse material. Both sides reflect and both sides emit, as in Cycles.
+
+    albedo: reflected share per channel, 0 to 1. emission: emitted radiance per channel, W/(m^2 sr).
+    """
+
+    name: str
+    albedo: RGB = (0.8, 0.8, 0.8)
+    emission: RGB = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class SceneObject:
+    """Triangles of one object in world space.
+
+    vertices (v, 3) float64, triangles (t, 3) int32 into vertices, counter-clockwise seen from the front,
+    surface (t,) int32 into Scene.surfaces. corner_normals (t, 3, 3) float32 are the shading normals of each triangle's
+    corners; None shades flat. A receiver is what gets a baked attribute; all objects block and bounce light.
+    """
+
+    name: str
+    vertices: Float64
+    triangles: Int32
+    surface: Int32
+    corner_normals: Float32 | None = None
+    receives: bool = True
+
+
+@dataclass(frozen=True)
+class PointLamp:
+    """A lamp that shines alike in all directions, from a point or a ball.
+
+    intensity: W/sr per channel, total over the ball. radius: metres; 0 is a point. facing_disc: the lamp is a disc that
+    turns to each receiver (Blender's "soft falloff") rather than a sphere.
+    """
+
+    name: str
+    position: Vector
+    intensity: RGB
+    radius: float = 0.0
+    facing_disc: bool = True
+
+
+@dataclass(frozen=True)
+class SpotLamp:
+    """A point lamp behind a cone. axes: rows are the lamp's local x, y, z in world space, scaled as the lamp object is;
+    the lamp shines along -z. cone_angle: full angle in radians. blend: 0 hard edge, 1 soft from the axis outward."""
+
+    name: str
+    position: Vector
+    intensity: RGB
+    axes: tuple[Vector, Vector, Vector]
+    cone_angle: float
+    blend: float
+    radius: float = 0.0
+    facing_disc: bool = True
+
+
+@dataclass(frozen=True)
+class SunLamp:
+    """Parallel light. direction: the way the light travels. irradiance: W/m^2 on a plane that faces it.
+    angle: full angle of the sun's disc in radians; 0 gives hard shadows."""
+
+    name: str
+    direction: Vector
+    irradiance: RGB
+    angle: float = 0.0
+
+
+@dataclass(frozen=True)
+class AreaLamp:
+    """A flat lamp that shines from one side, along cross(half_v, half_u)'s opposite: see `normal`.
+
+    half_u, half_v: from the centre to the middle of two neighbouring sides (or the ellipse's half axes).
+    normal: unit vector, the way it shines. radiance: W/(m^2 sr) along the normal.
+    spread: radians, pi for a plain diffuse emitter.
+    """
+
+    name: str
+    center: Vector
+    half_u: Vector
+    half_v: Vector
+    normal: Vector
+    radiance: RGB
+    shape: Literal["rectangle", "ellipse"] = "rectangle"
+    spread: float = np.pi
+
+
+Lamp = PointLamp | SpotLamp | SunLamp | AreaLamp
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything a bake needs. sky: radiance from every direction that no surface covers, W/(m^2 sr)."""
+
+    objects: tuple[SceneObject, ...]
+    surfaces: tuple[Surface, ...]
+    lamps: tuple[Lamp, ...] = ()
+    sky: RGB = (0.0, 0.0, 0.0)
+    warnings: tuple[str, ...] = field(default=())
+
+    def receivers(self) -> tuple[SceneObject, ...]:
+        return tuple(o for o in self.objects if o.receives)

@@ -1,0 +1,37 @@
+"""What a person may ask of a bake."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+Estimator = Literal["auto", "hemisphere", "analytic", "centroid"]
+
+#: Every layer a bake can deliver, and what it holds, W/(m^2 sr).
+LAYERS = {
+    "combined": "emitted plus reflected radiance, what Cycles' Combined bake gives",
+    "light": "irradiance / pi, without the surface's own colour",
+    "direct": "reflected radiance that came straight from lamps, emitting surfaces and the sky",
+    "indirect": "reflected radiance that bounced at least once",
+    "emission": "emitted radiance",
+    "sky": "reflected radiance that came straight from the sky",
+    "error": "estimated standard error of the combined radiance",
+}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """tessellate: split the receivers (results `new` and `replace`), or keep their corners (`keep`).
+    size: longest edge of a receiver's triangle, metres; None chooses it so that about `triangles` result.
+    error: asked surface error; seconds: asked time. With both None the error of a preview is used; with both set, the
+    bake ends at whichever comes first. threads: 0 takes every core."""
+
+    tessellate: bool = True
+    size: float | None = None
+    triangles: int = 50_000
+    error: float | None = 0.02
+    seconds: float | None = None
+    estimator: Estimator = "auto"
+    seed: int = 0
+    threads: int = 0
+    layers: tuple[str, ...] = ("combined",)
