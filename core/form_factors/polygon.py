@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from ..scene import Float64
 
@@ -39,7 +39,7 @@ def polygon_irradiance(
     x, n, corners = (np.asarray(a, dtype=np.float64) for a in (points, normals, polygon))
     shape = np.broadcast_shapes(x.shape[:-1], n.shape[:-1], corners.shape[:-2])
     if not shape:
-        return polygon_irradiance(x, n, corners[None], two_sided=two_sided)[0]
+        return np.asarray(polygon_irradiance(x, n, corners[None], two_sided=two_sided)[0])
     result = np.empty(shape)
     rows = max(1, _CHUNK // max(1, math.prod(shape[1:])))
     for start in range(0, len(result), rows):
@@ -130,4 +130,4 @@ def _lambert(x: Float64, n: Float64, corners: Float64, two_sided: bool) -> Float
         turn = (py * qz - pz * qy) * nx + (pz * qx - px * qz) * ny + (px * qy - py * qx) * nz
         total += np.arctan2(turn, px * qx + py * qy + pz * qz)
     total *= -0.5 / np.pi
-    return np.clip(np.abs(total) if two_sided else total, 0.0, 1.0)
+    return np.asarray(np.clip(np.abs(total) if two_sided else total, 0.0, 1.0))
