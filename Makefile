@@ -1,0 +1,63 @@
+# make bake        set up, and bake the Cornell box sample into build/
+# make test        set up, and run every check, on each Python that Blender uses and this machine has
+# make extension   one installable package per platform, in build/extension/
+# make lint        the style and type checks alone
+# make samples     rebuild the sample scenes from their scripts
+# make test-gui    drive a real Blender window (needs one: see tests/gui)
+
+.DEFAULT_GOAL := bake
+.PHONY: bake test test-3.13 lint samples extension test-gui clean
+
+SAMPLE := sample_blends/cornell_box_area_lamp.blend
+
+# Blender 5.0 as a Python module needs Python 3.11, Blender 5.2 needs 3.13. Every recipe works with either.
+PYTHON = $(shell packaging/find-python 3.11 3.13)
+PYTHON_3.13 = $(shell packaging/find-python 3.13)
+
+bake: .venv/ready
+	@mkdir -p build
+	@.venv/bin/radiosity-baker bake $(SAMPLE) --output build/cornell_box.blend --preview build/cornell_box.png --report build/report.json
+	@echo "Look at build/cornell_box.png, open build/cornell_box.blend in Blender; the figures are in build/report.json."
+
+test: lint
+	.venv/bin/python -m pytest --quiet
+	@if .venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 13))'; then \
+	    echo "SKIPPED: the tests on Python 3.11, which Blender 4.3 to 5.0 use: none that runs was found."; \
+	elif test -n "$(PYTHON_3.13)"; then $(MAKE) test-3.13; \
+	else \
+	    echo "SKIPPED: the tests on Python 3.13, which Blender 5.1 and later use: none that runs was found."; \
+	fi
+
+test-3.13: .venv-3.13/ready
+	.venv-3.13/bin/python -m pytest --quiet
+
+lint: .venv/ready
+	.venv/bin/ruff check --quiet
+	.venv/bin/ruff format --check --quiet
+	.venv/bin/mypy
+
+extension: .venv/ready
+	.venv/bin/python packaging/build_extension.py
+
+samples: .venv/ready
+	for script in $$(grep -l __main__ sample_blends/*.py); do .venv/bin/python $$script || exit 1; done
+
+test-gui: extension
+	tests/gui/run
+
+# The environments are made once, and again when pyproject.toml changes.
+.venv/ready: pyproject.toml
+	@test -x .venv/bin/python || test -n "$(PYTHON)" || \
+	    { echo "Radiosity Baker needs Python 3.11 or 3.13 (with venv), and found neither. Install one and try again." >&2; exit 2; }
+	@echo "Setting up .venv; the first time this downloads Blender as a Python module (about 400 MB)."
+	test -x .venv/bin/python || "$(PYTHON)" -m venv .venv
+	.venv/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[blender,dev]'
+	@touch $@
+
+.venv-3.13/ready: pyproject.toml
+	test -x .venv-3.13/bin/python || "$(PYTHON_3.13)" -m venv .venv-3.13
+	.venv-3.13/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[blender,dev]'
+	@touch $@
+
+clean:
+	rm -rf build .mypy_cache .pytest_cache .ruff_cache .hypothesis
