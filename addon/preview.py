@@ -1,0 +1,148 @@
+"""A picture of baked objects without a window: Workbench, flat light, so that the baked values themselves are shown.
+
+The picture is taken in a scene of its own, which is removed again: nothing of the user's scene is touched, and what was
+not baked (above all the originals under their baked copies) is not in the way.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix, Vector
+
+from ..core.scene import SceneError
+
+#: Pixels across. The height follows the scene's own aspect.
+WIDTH = 1280
+
+#: Auto exposure puts this percentile of the luminances, weighted by area, at this linear value. High enough to fill the
+#: picture, low enough that lamps and windows, which are few and far brighter, are what clips.
+WHITE_PERCENTILE, WHITE_VALUE = 95.0, 0.8
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, Blender's scene-linear primaries
+
+#: Where the stand-in camera looks from when the scene has none: front, right and above.
+THREE_QUARTER_VIEW = Vector((1.0, -1.6, 0.9))
+
+#: How much further back the stand-in camera stands than what would just fit.
+MARGIN = 1.05
+
+
+def render_preview(
+    scene: bpy.types.Scene,
+    objects: Sequence[bpy.types.Object],
+    path: Path,
+    *,
+    attribute: str,
+    exposure: float | None = None,
+) -> float:
+    """Render `objects`, coloured by their attribute `attribute`, through the scene's camera into a PNG at `path`.
+
+    exposure: stops; None keeps the scene's own where it has one, and else chooses one by the baked values. Returns the
+    exposure used. Without a camera the objects are framed from outside. Raises SceneError when an object lacks the
+    attribute.
+    """
+    for item in objects:
+        if attribute not in item.data.color_attributes:
+            raise SceneError(f"Object '{item.name}' has no colour attribute '{attribute}': bake it first.")
+    if exposure is None:
+        exposure = scene.view_settings.exposure or auto_exposure(objects, attribute)
+    with ExitStack() as stack:
+        for mesh in {item.data for item in objects}:
+            stack.enter_context(_active_colour(mesh, attribute))
+        studio = stack.enter_context(_studio(scene, objects))
+        studio.view_settings.exposure = exposure
+        studio.render.filepath = str(path)
+        bpy.ops.render.render(scene=studio.name, write_still=True)
+    return exposure
+
+
+def auto_exposure(objects: Sequence[bpy.types.Object], attribute: str) -> float:
+    """Stops, to a tenth, at which most of the baked surface is neither dark nor clipped; 0 where all is black."""
+    luminances, areas = [], []
+    for item in objects:
+        mesh = item.data
+        colours = np.empty(len(mesh.loops) * 4, np.float32)
+        mesh.color_attributes[attribute].data.foreach_get("color", colours)
+        corners = np.empty(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("loop_total", corners)
+        area = np.empty(len(mesh.polygons), np.float32)
+        mesh.polygons.foreach_get("area", area)
+        luminances.append(colours.reshape(-1, 4)[:, :3] @ LUMINANCE)
+        areas.append(np.repeat(area / corners, corners) * abs(item.matrix_world.determinant()) ** (2 / 3))
+    luminance, weight = np.concatenate(luminances), np.concatenate(areas)
+    order = np.argsort(luminance)
+    below = np.cumsum(weight[order])
+    white = luminance[order[np.searchsorted(below, below[-1] * WHITE_PERCENTILE / 100)]]
+    return round(math.log2(WHITE_VALUE / white), 1) if white > 0 else 0.0
+
+
+@contextmanager
+def _active_colour(mesh: bpy.types.Mesh, attribute: str) -> Iterator[None]:
+    """Make `attribute` the one that is drawn, for a while."""
+    before = mesh.color_attributes.active_color_name
+    mesh.color_attributes.active_color_name = attribute
+    try:
+        yield
+    finally:
+        mesh.color_attributes.active_color_name = before
+
+
+@contextmanager
+def _studio(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Iterator[bpy.types.Scene]:
+    """A scene that holds only `objects`, seen by the camera of `scene`, set up for a flat picture of colours."""
+    studio = bpy.data.scenes.new("Radiosity preview")
+    stand_in = None
+    try:
+        for item in objects:
+            studio.collection.objects.link(item)
+        studio.frame_set(scene.frame_current)
+        studio.world = scene.world  # for its viewport colour, the backdrop
+        _show_values(studio)
+        shape = scene.render
+        studio.render.pixel_aspect_x, studio.render.pixel_aspect_y = shape.pixel_aspect_x, shape.pixel_aspect_y
+        studio.render.resolution_x, studio.render.resolution_percentage = WIDTH, 100
+        studio.render.resolution_y = max(1, round(WIDTH * shape.resolution_y / shape.resolution_x))
+        if scene.camera is None:
+            stand_in = _framing_camera(studio, objects)
+        studio.camera = scene.camera or stand_in
+        yield studio
+    finally:
+        bpy.data.scenes.remove(studio)
+        if stand_in is not None:
+            bpy.data.cameras.remove(stand_in.data)  # and its object with it
+
+
+def _show_values(studio: bpy.types.Scene) -> None:
+    """Colours as they are: no light, no shadow, no outline, and the plain sRGB curve of the Standard view."""
+    studio.render.engine = "BLENDER_WORKBENCH"
+    image = studio.render.image_settings
+    image.file_format, image.color_mode = "PNG", "RGB"
+    studio.display.render_aa = "16"
+    shading = studio.display.shading
+    shading.light, shading.color_type = "FLAT", "VERTEX"
+    shading.show_shadows = shading.show_cavity = shading.show_object_outline = shading.show_xray = False
+    studio.view_settings.view_transform, studio.view_settings.look = "Standard", "None"
+    studio.view_settings.gamma = 1.0
+
+
+def _framing_camera(studio: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> bpy.types.Object:
+    """A camera in `studio` that sees all of `objects` from the front, the right and above."""
+    camera = bpy.data.objects.new("Radiosity preview", bpy.data.cameras.new("Radiosity preview"))
+    studio.collection.objects.link(camera)
+    camera.matrix_world = THREE_QUARTER_VIEW.to_track_quat("Z", "Y").to_matrix().to_4x4()
+    depsgraph = studio.view_layers[0].depsgraph
+    depsgraph.update()
+    corners = [item.matrix_world @ Vector(corner) for item in objects for corner in item.bound_box]
+    location, _ = camera.camera_fit_coords(depsgraph, [value for corner in corners for value in corner])
+    middle = sum(corners, Vector()) / len(corners)
+    location = middle + MARGIN * (location - middle)
+    distances = sorted((corner - location).length for corner in corners)
+    camera.data.clip_start, camera.data.clip_end = distances[0] / 1000, distances[-1] * 2
+    camera.matrix_world = Matrix.Translation(location) @ camera.matrix_world
+    return camera
