@@ -1,0 +1,276 @@
+"""What the command line can do: bake a file, or say what baking it would take."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import bpy
+
+from ..core.plan import plan
+from ..core.progress import Cancelled, Progress
+from ..core.result import Report
+from ..core.scene import SceneError
+from ..core.settings import LAYERS, Settings
+from . import panels
+from .bake_scene import bake_objects
+from .preview import render_preview
+from .scene_reader import pick_receivers, read_scene
+
+SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
+
+
+class FileError(Exception):
+    """A file cannot be read or written as asked. The message names it and the remedy."""
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Parse and run one command line. Returns the exit code; problems have been printed to stderr."""
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as stop:  # argparse has said what it has to say; Blender must not quit half-way for it
+        return int(stop.code or SUCCESS)
+    progress = Progress() if options.quiet else PrintedProgress()
+    try:
+        with _interruptible(progress):
+            options.command(options, progress)
+    except (FileError, SceneError) as problem:
+        print(f"radiosity-baker: {problem}", file=sys.stderr)
+        return UNUSABLE
+    except (Cancelled, KeyboardInterrupt):
+        print("radiosity-baker: Interrupted; nothing was written.", file=sys.stderr)
+        return INTERRUPTED
+    return SUCCESS
+
+
+class PrintedProgress(Progress):
+    """Prints a line when a stage begins, and within a stage at every tenth of the bake."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._printed: tuple[str, int] | None = None
+
+    def report(self, stage: str, fraction: float, error: float | None = None) -> None:
+        super().report(stage, fraction, error)
+        step = (stage, int(10 * fraction))
+        if step != self._printed:
+            self._printed = step
+            quality = "" if self.error is None else f", estimated error {panels.percent(self.error)}"
+            print(f"{fraction:4.0%}  {stage}{quality}", flush=True)
+
+
+def _bake(options: argparse.Namespace, progress: Progress) -> None:
+    """Bake a file into another one. Nothing is written before all of it is there."""
+    _check_destinations([path for path in (options.output, options.report, options.preview) if path is not None])
+    source = _open(options.input)
+    compress = _is_compressed(source)
+    receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
+    result, baked = bake_objects(
+        bpy.context,
+        receivers,
+        _settings(options),
+        result_mode=options.result,
+        attribute=options.attribute,
+        progress=progress,
+    )
+    with ExitStack() as unfinished:
+        # Entered first, moved into place last: whoever sees the .blend finds the report and the preview beside it.
+        blend = unfinished.enter_context(_moved_into_place(options.output))
+        if options.report is not None:
+            _write_report(unfinished.enter_context(_moved_into_place(options.report)), result.report)
+        _save(blend, compress=compress)
+        if options.preview is not None:
+            picture = unfinished.enter_context(_moved_into_place(options.preview))
+            render_preview(bpy.context.scene, baked, picture, attribute=options.attribute)
+        progress.check()
+        if options.output.exists() and options.output.samefile(source):
+            shutil.copy2(source, f"{source}1")  # Blender's own habit when it saves over a file
+    _say_what_was_done(result.report, quiet=options.quiet)
+
+
+def _plan(options: argparse.Namespace, progress: Progress) -> None:
+    """Say which effects a bake would simulate and why, and what it would cost."""
+    _open(options.input)
+    receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
+    settings = _settings(options)
+    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
+    progress.check()
+    outlook = plan(scene, settings)
+    for effect in outlook.effects:
+        print(f"{'on ' if effect.active else 'off'}  {effect.name}: {effect.reason}")
+    for warning in scene.warnings:
+        print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
+    print(f"About {outlook.seconds:.1f} s and {outlook.memory_mb:,.0f} MB.")
+
+
+def _say_what_was_done(report: Report, *, quiet: bool) -> None:
+    facts = report.as_dict()
+    for warning in report.warnings:
+        print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
+    if not quiet:
+        print(". ".join([f"Baked {panels.what_was_baked(facts)}", *panels.error_lines(facts)]) + ".")
+
+
+def _settings(options: argparse.Namespace) -> Settings:
+    asked = {"seconds": options.seconds, "error": None} if options.seconds else {"error": options.error}
+    return Settings(
+        tessellate=options.result != "keep",
+        seed=options.seed,
+        threads=options.threads,
+        layers=options.layers,
+        **asked,
+    )
+
+
+def _open(path: Path | None) -> Path:
+    """Load a .blend without running what scripts it holds, or take the one Blender has open; the file's path."""
+    if path is None:
+        if not bpy.data.filepath:
+            raise FileError("No file to bake: give the .blend file after the command.")
+        return Path(bpy.data.filepath)
+    if not path.is_file():
+        raise FileError(f"{path} is not there: check the path of the .blend file.")
+    try:
+        bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
+    except RuntimeError as problem:
+        reason = str(problem).strip().removeprefix("Error: ")
+        raise FileError(f"{path} cannot be read: save it again from Blender. ({reason})") from problem
+    return path
+
+
+def _is_compressed(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(7) != b"BLENDER"
+
+
+def _check_destinations(paths: Sequence[Path]) -> None:
+    for path in paths:
+        if not path.parent.is_dir():
+            raise FileError(f"The folder {path.parent} is not there: create it, or write {path.name} somewhere else.")
+        if path.is_dir():
+            raise FileError(f"{path} is a folder: add a file name.")
+        if not os.access(path.parent, os.W_OK):
+            raise FileError(f"The folder {path.parent} cannot be written to: write {path.name} somewhere else.")
+
+
+@contextmanager
+def _moved_into_place(path: Path) -> Iterator[Path]:
+    """A temporary name beside `path`, which takes the place of `path` when the block ends well and goes when not."""
+    temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    try:
+        yield temporary
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _save(path: Path, *, compress: bool) -> None:
+    try:
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress)
+    except RuntimeError as problem:
+        raise FileError(f"The baked file cannot be saved in {path.parent}: is the disk full? ({problem})") from problem
+
+
+def _write_report(path: Path, report: Report) -> None:
+    path.write_text(json.dumps(report.as_dict(), indent=2) + "\n", encoding="utf-8")
+
+
+@contextmanager
+def _interruptible(progress: Progress) -> Iterator[None]:
+    """The first Ctrl-C asks the bake to stop at its next chunk of work; a second one does not ask."""
+
+    def stop(*_: object) -> None:
+        progress.cancel()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    before = signal.signal(signal.SIGINT, stop)
+    try:
+        yield
+    finally:
+        # Blender's own handler was not set from Python: there is nothing to put back but the default.
+        signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="radiosity-baker", description="Bake the light of a Blender scene into colour attributes."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    bake = commands.add_parser("bake", help="bake a .blend file into another one", description=_bake.__doc__)
+    _add_scene_arguments(bake)
+    bake.set_defaults(command=_bake)
+    bake.add_argument("--output", type=_file(".blend"), required=True, metavar="OUT.blend", help="the baked file")
+    bake.add_argument("--attribute", default="Radiosity", help="name of the colour attribute (Radiosity)")
+    bake.add_argument("--report", type=_file(""), metavar="FILE.json", help="write what was done and how well")
+    bake.add_argument("--preview", type=_file(".png"), metavar="FILE.png", help="render a picture of the baked objects")
+
+    outlook = commands.add_parser("plan", help="what a bake would simulate and cost", description=_plan.__doc__)
+    _add_scene_arguments(outlook)
+    outlook.set_defaults(command=_plan)
+    return parser
+
+
+def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to bake and how well: the same for doing it and for planning it."""
+    parser.add_argument(
+        "input", type=_file(".blend"), nargs="?", metavar="IN.blend", help="the scene; else what is open"
+    )
+    parser.add_argument("--objects", type=_names, metavar="A,B", help="meshes to bake; else the selected, else all")
+    goal = parser.add_mutually_exclusive_group()
+    goal.add_argument("--error", type=_positive, default=Settings.error, help="surface error to reach (0.02 is 2 %%)")
+    goal.add_argument("--seconds", type=_positive, help="time to use instead")
+    parser.add_argument("--seed", type=_whole, default=Settings.seed, help="another seed, another noise (0)")
+    parser.add_argument("--threads", type=_whole, default=Settings.threads, help="0, the default, takes every core")
+    parser.add_argument(
+        "--result",
+        choices=("keep", "replace", "new"),
+        default="new",
+        help="light the mesh's own corners, tessellate the mesh, or (the default) add a tessellated copy",
+    )
+    layers = f"any of {', '.join(LAYERS)} (combined)"
+    parser.add_argument("--layers", type=_layers, default=Settings.layers, metavar="A,B", help=layers)
+    parser.add_argument("--quiet", action="store_true", help="print problems only")
+
+
+def _file(suffix: str) -> Callable[[str], Path]:
+    def convert(text: str) -> Path:
+        path = Path(text).expanduser().absolute()
+        if not path.name.lower().endswith(suffix):
+            raise argparse.ArgumentTypeError(f"'{text}' does not end in {suffix}")
+        return path
+
+    return convert
+
+
+def _names(text: str) -> list[str]:
+    return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _layers(text: str) -> tuple[str, ...]:
+    names = _names(text)
+    for name in names:
+        if name not in LAYERS:
+            raise argparse.ArgumentTypeError(f"unknown layer '{name}': choose from {', '.join(LAYERS)}")
+    return tuple(names)
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is below 0")
+    return value
