@@ -6,7 +6,6 @@ reader of the add-on fills these classes in, and a test or another program can d
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Literal
 

@@ -1,0 +1,89 @@
+"""Light at sample points of the receivers: indirect light from the solved patches, and direct light anew.
+
+Every pass puts one new point into each cell, looks around from it, and adds what arrives to the samples of the fit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .direct.illumination import DirectLight
+from .hemisphere import Hemispheres
+from .parallel import Workers
+from .patches import Cells
+from .reconstruction import Samples
+from .sampling import plane_points, stream, triangle_points
+from .scene import Bool, Float32, Float64
+
+#: Share of rays that must meet backs before a dark point counts as inside a solid.
+_ENCLOSED = 0.75
+_CHUNK = 2048
+
+
+class Points:
+    """The sample points of one pass: the pass-th point of an even sequence in each cell, of the cells in `chosen`."""
+
+    def __init__(self, cells: Cells, chosen: np.ndarray, number: int, shift: Float64) -> None:
+        self.weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
+        self.positions = np.einsum("nc,nck->nk", self.weights, cells.corners[chosen])
+        self.normals = cells.normals[chosen]
+        self.barycentric = np.einsum("nc,nck->nk", self.weights, cells.barycentric[chosen])
+        self.shading = self.normals
+        if cells.shading is not None:
+            blended = np.einsum("nc,nck->nk", self.weights, cells.shading[chosen])
+            self.shading = blended / np.linalg.norm(blended, axis=1, keepdims=True)
+
+
+def gather_indirect(
+    points: Points, hemispheres: Hemispheres, tables: Float32, seed: int, number: int, workers: Workers
+) -> tuple[Float64, Float64, Bool]:
+    """Irradiance (n, k) at the points from tables (codes, k) of radiosity, its variance (n, k), and the points (n,)
+    from which nearly every ray meets the back of something: inside a solid, unless light gets there.
+
+    The rays of a point are two independent sets; how much they differ is how far the mean can be trusted.
+    """
+    columns = [np.ascontiguousarray(tables[:, k]) for k in range(tables.shape[1])]
+    codes = hemispheres.codes
+
+    def work(chunk: int, part: slice) -> tuple[Float64, Float64, Bool]:
+        rng = stream(seed, f"gather {number}", chunk)
+        code = hemispheres.cast(points.positions[part], points.normals[part], points.shading[part], rng)
+        halves = [column[code].reshape(len(code), 2, -1).mean(axis=2, dtype=np.float64) for column in columns]
+        irradiance = np.stack([h.mean(axis=1) for h in halves], axis=1)
+        variance = np.stack([(h[:, 0] - h[:, 1]) ** 2 / 4.0 for h in halves], axis=1)
+        behind = ((code >= codes.triangles) & (code < codes.escaped)).mean(axis=1)
+        return irradiance, variance, behind > _ENCLOSED
+
+    parts = zip(*workers.map(work, len(points.positions), hemispheres.chunk), strict=True)
+    irradiance, variance, enclosed = (np.concatenate(p) for p in parts)
+    return irradiance, variance, enclosed
+
+
+def gather_direct(
+    points: Points, direct_light: DirectLight, shadow_rays: int, seed: int, number: int, workers: Workers
+) -> tuple[Float64, np.ndarray, int]:
+    """Irradiance (n, 3) straight from lamps and emitting surfaces, the set of lights seen (n,), and the rays cast."""
+
+    def work(chunk: int, part: slice) -> tuple[Float64, np.ndarray, int]:
+        rng = stream(seed, f"direct {number}", chunk)
+        light = direct_light.at(points.positions[part], points.normals[part], points.shading[part], shadow_rays, rng)
+        return light.irradiance, light.signature, light.rays
+
+    irradiance, signature, rays = zip(*workers.map(work, len(points.positions), _CHUNK), strict=True)
+    return np.concatenate(irradiance), np.concatenate(signature), sum(rays)
+
+
+def shadow_boundary(corner_vertex: np.ndarray, vertices: int, signatures: list[np.ndarray]) -> Bool:
+    """Cells (c,) that see some light in part, or other lights than a cell they share a fit vertex with.
+
+    corner_vertex (c, 3): fit vertices around each cell; signatures: of each pass, (c,) int64.
+    """
+    low = np.minimum.reduce(signatures)
+    high = np.maximum.reduce(signatures)
+    vertex_low = np.full(vertices, np.iinfo(np.int64).max)
+    vertex_high = np.full(vertices, np.iinfo(np.int64).min)
+    for corner in range(3):
+        np.minimum.at(vertex_low, corner_vertex[:, corner], low)
+        np.maximum.at(vertex_high, corner_vertex[:, corner], high)
+    changes = (vertex_low < 0) | (vertex_low != vertex_high)
+    return np.asarray(changes[corner_vertex].any(axis=1))

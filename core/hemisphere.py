@@ -1,0 +1,75 @@
+"""Looking around: cosine-distributed, stratified rays from surface points, and what each of them meets.
+
+Both the transport rows and the final gather are made of these; they differ only in what they look up at the hits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .patches import Patches
+from .sampling import cosine_patterns, frames
+from .scene import Float32, Float64
+from .visibility import Visibility, offset_along
+
+#: Rays a chunk: its directions and hits then stay in a core's second-level cache.
+CHUNK_RAYS = 16384
+_PATTERNS = 256
+
+
+@dataclass(frozen=True)
+class Codes:
+    """What a ray met, as one integer: triangle index for a front, plus `triangles` for a back, or one of two more."""
+
+    triangles: int
+
+    @property
+    def escaped(self) -> int:
+        return 2 * self.triangles
+
+    @property
+    def lost(self) -> int:
+        """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles."""
+        return 2 * self.triangles + 1
+
+
+class Hemispheres:
+    """Casts `rays` rays over the hemisphere of each point, as two independent sets of half as many.
+
+    rng only chooses the set of patterns; every call draws its own patterns and turns from the stream it is given.
+    """
+
+    def __init__(self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator) -> None:
+        self.rays = rays
+        self.codes = Codes(len(patches.normals))
+        self.chunk = max(1, CHUNK_RAYS // rays)
+        self._visibility = visibility
+        self._normals = patches.normals.astype(np.float32)
+        half = rays // 2
+        self._patterns = np.concatenate(
+            [cosine_patterns(_PATTERNS, half, rng), cosine_patterns(_PATTERNS, rays - half, rng)], axis=1
+        )
+
+    def cast(self, points: Float64, normals: Float64, shading: Float64, rng: np.random.Generator) -> np.ndarray:
+        """Codes (n, rays) int32 for points (n, 3) with geometric normals and shading normals (n, 3)."""
+        count = len(points)
+        turn = rng.random(count, dtype=np.float32) * np.float32(2 * np.pi)
+        pattern = self._patterns[rng.integers(_PATTERNS, size=count)]
+        directions = (pattern @ frames(shading.astype(np.float32), turn)).reshape(-1, 3)
+        origins = np.repeat(offset_along(points, normals), self.rays, axis=0)
+        hit = self._visibility.nearest(origins, directions)
+        code = np.where(hit < 0, self.codes.escaped, hit)
+        code[self._from_behind(hit, directions)] += self.codes.triangles
+        code = code.reshape(count, self.rays)
+        tilted = np.flatnonzero(np.einsum("nk,nk->n", normals, shading) < 1.0 - 1e-6)
+        if len(tilted):
+            below = directions.reshape(count, self.rays, 3)[tilted] @ normals[tilted].astype(np.float32)[:, :, None]
+            code[tilted] = np.where(below[..., 0] <= 0, self.codes.lost, code[tilted])
+        return code
+
+    def _from_behind(self, hit: np.ndarray, directions: Float32) -> np.ndarray:
+        """Whether each ray met the back of a triangle; False for rays that met nothing."""
+        along = np.einsum("nk,nk->n", self._normals[hit], directions)
+        return (along > 0) & (hit >= 0)

@@ -1,0 +1,44 @@
+"""A fixed cut of work into chunks, so that the result does not depend on how many threads did it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+from .progress import Progress
+
+Result = TypeVar("Result")
+
+
+def thread_count(asked: int) -> int:
+    """The asked number of threads, or one for each core this process may use."""
+    if asked > 0:
+        return asked
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1
+
+
+class Workers:
+    """Threads that work off chunks. numpy and Embree release the interpreter inside their loops, so these scale."""
+
+    def __init__(self, threads: int, progress: Progress) -> None:
+        self.threads = thread_count(threads)
+        self.progress = progress
+        self._pool = ThreadPoolExecutor(self.threads, "radiosity")
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._pool.shutdown(wait=True, cancel_futures=True)
+
+    def map(self, function: Callable[[int, slice], Result], count: int, chunk: int) -> Iterator[Result]:
+        """function(chunk number, slice) over `count` items, results in order. Raises Cancelled between chunks."""
+
+        def work(number: int) -> Result:
+            self.progress.check()
+            return function(number, slice(number * chunk, min((number + 1) * chunk, count)))
+
+        return self._pool.map(work, range(-(-count // chunk)))

@@ -1,0 +1,134 @@
+"""Triform: a triangle into four by its edge midpoints, recursively, without cracks.
+
+Whether an edge is split depends on that edge alone, so the two triangles that share it always agree: no T-junctions.
+A triangle whose three edges are too long becomes four; one with a short edge becomes three or two, which keeps thin
+triangles from getting thinner ("red-green" refinement: Bank, Sherman, Weiser 1983).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scene import Float64, Int32
+
+# Children of a triangle a, b, c with edge midpoints d = ab, e = bc, f = ca, as indices into (a, b, c, d, e, f).
+_FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]])
+_TWO = np.array([[0, 3, 2], [3, 1, 2]])  # only ab is split
+# ab and bc are split: the corner at b, and a quad a, d, e, c cut along a shorter or a longer diagonal.
+_THREE_AE = np.array([[3, 1, 4], [0, 3, 4], [0, 4, 2]])
+_THREE_DC = np.array([[3, 1, 4], [0, 3, 2], [3, 4, 2]])
+
+MAXIMUM_PASSES = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Tessellation:
+    """vertices (v, 3) float64, the input's own first; triangles (t, 3) int32; parent (t,) int32, ascending;
+    barycentric (t, 3, 3) float64: weights of the parent's corners at each corner."""
+
+    vertices: Float64
+    triangles: Int32
+    parent: Int32
+    barycentric: Float64
+
+
+def whole(vertices: Float64, triangles: Int32) -> Tessellation:
+    """The tessellation that splits nothing."""
+    return Tessellation(
+        vertices,
+        triangles,
+        np.arange(len(triangles), dtype=np.int32),
+        np.broadcast_to(np.eye(3), (len(triangles), 3, 3)),
+    )
+
+
+def triform(mesh: Tessellation, longest_edge: float) -> Tessellation:
+    """Split the triangles of a mesh until no edge is longer than longest_edge (metres)."""
+    for _ in range(MAXIMUM_PASSES):
+        refined = _split_long_edges(mesh, longest_edge)
+        if refined is mesh:
+            break
+        mesh = refined
+    return mesh
+
+
+def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
+    corners = mesh.vertices[mesh.triangles]
+    edges = corners[:, [1, 2, 0]] - corners
+    marked = np.einsum("tij,tij->ti", edges, edges) > longest_edge * longest_edge
+    count = marked.sum(axis=1)
+    if not count.any():
+        return mesh
+    midpoint, vertices = _midpoints(mesh, marked)
+    six = np.concatenate([mesh.triangles, midpoint], axis=1)
+    weights = np.concatenate([mesh.barycentric, (mesh.barycentric + mesh.barycentric[:, [1, 2, 0]]) / 2], axis=1)
+    # Turn each triangle so that its split edges come first: ab when one is split, ab and bc when two are.
+    turn = np.where(count == 1, np.argmax(marked, axis=1), 0)
+    turn = np.where(count == 2, (np.argmin(marked, axis=1) + 1) % 3, turn)
+    order = np.array([[0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4]])[turn]
+    six = np.take_along_axis(six, order, axis=1)
+    weights = np.take_along_axis(weights, order[:, :, None], axis=1)
+
+    triangles, barycentric, source = [], [], []
+    for template, chosen in _templates(count, vertices, six):
+        triangles.append(six[chosen][:, template].reshape(-1, 3))
+        barycentric.append(weights[chosen][:, template].reshape(-1, 3, 3))
+        source.append(np.repeat(chosen, len(template)))
+    # Children stand where their parent stood, so neighbours in space stay neighbours in memory.
+    back = np.argsort(np.concatenate(source), kind="stable")
+    return Tessellation(
+        vertices,
+        np.concatenate(triangles)[back].astype(np.int32),
+        mesh.parent[np.concatenate(source)[back]],
+        np.concatenate(barycentric)[back],
+    )
+
+
+def _midpoints(mesh: Tessellation, marked: np.ndarray) -> tuple[Int32, Float64]:
+    """One new vertex for each marked edge, shared by the triangles on both of its sides."""
+    ends = np.stack([mesh.triangles, mesh.triangles[:, [1, 2, 0]]], axis=2)[marked]
+    ends.sort(axis=1)
+    keys = ends[:, 0].astype(np.int64) * len(mesh.vertices) + ends[:, 1]
+    unique, number = np.unique(keys, return_inverse=True)
+    first, second = np.divmod(unique, len(mesh.vertices))
+    midpoint = np.full(mesh.triangles.shape, -1, dtype=np.int32)
+    midpoint[marked] = len(mesh.vertices) + number.reshape(-1)
+    return midpoint, np.concatenate([mesh.vertices, (mesh.vertices[first] + mesh.vertices[second]) / 2])
+
+
+def _templates(count: np.ndarray, vertices: Float64, six: Int32) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Which triangles take which set of children; a quad is cut along its shorter diagonal."""
+    two = np.flatnonzero(count == 2)
+    a_to_e = np.linalg.norm(vertices[six[two, 0]] - vertices[six[two, 4]], axis=1)
+    d_to_c = np.linalg.norm(vertices[six[two, 3]] - vertices[six[two, 2]], axis=1)
+    shorter = a_to_e <= d_to_c
+    return [
+        (np.array([[0, 1, 2]]), np.flatnonzero(count == 0)),
+        (_TWO, np.flatnonzero(count == 1)),
+        (_THREE_AE, two[shorter]),
+        (_THREE_DC, two[~shorter]),
+        (_FOUR, np.flatnonzero(count == 3)),
+    ]
+
+
+def edge_for_count(vertices: list[Float64], triangles: list[Int32], wanted: int) -> float:
+    """The longest edge (metres) at which the meshes together split into about `wanted` triangles.
+
+    The count jumps by up to four where many edges have the same length, so it is met within a factor of two at worst.
+    """
+    corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
+    guess = np.sqrt(2.0 * areas.sum() / max(wanted, 1)) * np.sqrt(2.0)
+    candidates = guess * 2.0 ** np.linspace(-2, 2, 33)
+    counts = np.array([_predicted_count(edges, size) for size in candidates])
+    return float(candidates[np.argmin(np.abs(np.log(counts / wanted)))])
+
+
+def _predicted_count(edges: Float64, size: float) -> float:
+    """Triangles after splitting, from the number of halvings of each edge: exact for three equal depths."""
+    depth = np.maximum(np.ceil(np.log2(np.maximum(edges, 1e-300) / size) - 1e-9), 0.0)
+    depth.sort(axis=1)
+    return float(np.sum(2.0 ** (depth[:, 2] + depth[:, 1])))
