@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 import bpy
 
@@ -141,7 +142,10 @@ def _open(path: Path | None) -> Path:
         bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False, use_scripts=False)
     except RuntimeError as problem:
         reason = str(problem).strip().removeprefix("Error: ")
-        raise FileError(f"{path} cannot be read: save it again from Blender. ({reason})") from problem
+        raise FileError(
+            f"{path} cannot be read by Blender {bpy.app.version_string}: "
+            f"check that it is a Blender file, and not one of a newer version. ({reason})"
+        ) from problem
     return path
 
 
@@ -198,10 +202,15 @@ def _interruptible(progress: Progress) -> Iterator[None]:
         signal.signal(signal.SIGINT, before or signal.SIG_DFL)
 
 
+class _Parser(argparse.ArgumentParser):
+    """Says in one line what is wrong, without the whole usage before it."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(UNUSABLE, f"{self.prog}: {message}; see `{self.prog} --help`.\n")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        prog="radiosity-baker", description="Bake the light of a Blender scene into colour attributes."
-    )
+    parser = _Parser(prog="radiosity-baker", description="Bake the light of a Blender scene into colour attributes.")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     bake = commands.add_parser("bake", help="bake a .blend file into another one", description=_bake.__doc__)
