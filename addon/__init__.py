@@ -1,0 +1,17 @@
+"""Blender's half: reads the scene, runs the bake, writes the attributes and draws the panel."""
+
+from . import headless, operators, panels, properties, viewport
+
+WINDOW = (viewport, properties, operators, panels)
+
+
+def register() -> None:
+    for module in WINDOW:
+        module.register()
+    headless.register_command()
+
+
+def unregister() -> None:
+    headless.unregister_command()
+    for module in reversed(WINDOW):
+        module.unregister()

@@ -1,0 +1,251 @@
+"""What a person sees: the panel in the Render properties and in the 3D View's sidebar, and the status bar.
+
+Both places show the same sections; each section is written once, and a class per place is made from it, since Blender
+wants one class for every panel of every editor.
+"""
+
+import textwrap
+from typing import Any, ClassVar
+
+import bpy
+
+from . import viewport
+from .job import BakeJob
+
+#: Where the panel appears, and what Blender wants to know about each place.
+PLACES = {
+    "RENDER": {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_context": "render"},
+    "VIEW3D": {"bl_space_type": "VIEW_3D", "bl_region_type": "UI", "bl_category": "Radiosity"},
+}
+
+PIXELS_PER_LETTER = 7.5
+
+
+class BakeSection:
+    bl_label = "Radiosity"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings, layout = context.scene.radiosity_baker, self.layout
+        if BakeJob.running is None:
+            button = layout.column()
+            button.scale_y = 1.5
+            button.operator("object.radiosity_bake", icon="LIGHT_SUN")
+            layout.label(text=_what_is_baked(context), icon="INFO")
+        else:
+            _draw_progress(layout, BakeJob.running)
+
+        layout = layout.column()
+        layout.enabled = BakeJob.running is None
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        column = layout.column()
+        column.row().prop(settings, "goal", expand=True)
+        column.prop(settings, "error" if settings.goal == "ERROR" else "seconds")
+        layout.prop(settings, "result")
+        column = layout.column()
+        column.active = settings.result != "KEEP"
+        column.prop(settings, "density")
+        column.prop(settings, "triangles" if settings.density == "TRIANGLES" else "size")
+
+
+class LastBakeSection:
+    bl_label = "Last Bake"
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.scene.radiosity_baker.last_report() is not None
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings, layout = context.scene.radiosity_baker, self.layout
+        report = settings.last_report()
+        row = layout.row(align=True)
+        row.operator("view3d.radiosity_show", icon="HIDE_OFF", depress=viewport.is_shown(context))
+        row.operator("view3d.radiosity_restore", icon="LOOP_BACK", text="Restore")
+        layers = viewport.baked_layers(context.scene, report)
+        if len(layers) > 1:
+            grid = layout.grid_flow(columns=3, even_columns=True, align=True)
+            for layer in layers:
+                grid.prop_enum(settings, "layer", layer)
+
+        column = layout.column(align=True)
+        for text in (what_was_baked(report), *error_lines(report), *energy_lines(report)):
+            _label(column, context, text)
+        for warning in report["warnings"]:
+            _label(layout.column(align=True), context, warning, icon="ERROR")
+
+
+class EffectsSection:
+    bl_label = "Effects"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        report = context.scene.radiosity_baker.last_report()
+        return report is not None and bool(report["effects"])
+
+    def draw(self, context: bpy.types.Context) -> None:
+        for effect in context.scene.radiosity_baker.last_report()["effects"]:
+            column = self.layout.column(align=True)
+            column.active = effect["active"]
+            name = effect["name"].replace("_", " ").capitalize()
+            column.label(text=name, icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT")
+            _label(column, context, effect["reason"], icon="BLANK1")
+
+
+class AdvancedSection:
+    bl_label = "Advanced"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    def draw(self, context: bpy.types.Context) -> None:
+        settings, layout = context.scene.radiosity_baker, self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.prop(settings, "estimator")
+        layout.prop(settings, "seed")
+        layout.prop(settings, "threads")
+        layout.prop(settings, "attribute")
+        layout.prop(settings, "show_when_done")
+        layout.column().prop(settings, "layers", expand=True)
+
+
+def summary(report: dict[str, Any]) -> str:
+    """What a bake did and how good it is, in one line."""
+    error = report["estimated_error"].get("total")
+    quality = "" if error is None else f", estimated error {percent(error)}"
+    return f"Baked {what_was_baked(report)}{quality}"
+
+
+def what_was_baked(report: dict[str, Any]) -> str:
+    objects = report["objects"]
+    triangles = sum(entry["triangles"] for entry in objects)
+    return f"{_objects('object', len(objects))}, {triangles:,} triangles in {report['seconds']['total']:.1f} s"
+
+
+def error_lines(report: dict[str, Any]) -> list[str]:
+    """The stated error, and the three causes it comes from."""
+    error = report["estimated_error"]
+    if "total" not in error:
+        return []
+    parts = [f"{cause} {percent(error[cause])}" for cause in ("sampling", "transport", "resolution") if cause in error]
+    return [f"Estimated error {percent(error['total'])}: {', '.join(parts)}"]
+
+
+def energy_lines(report: dict[str, Any]) -> list[str]:
+    """The energy ledger in words."""
+    energy = report["energy"]
+    if not energy.get("emitted"):
+        return []
+    emitted, absorbed, escaped, residual = (
+        watts(energy[name]) for name in ("emitted", "absorbed", "escaped", "residual")
+    )
+    return [f"Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {residual} are not accounted for"]
+
+
+def percent(share: float) -> str:
+    return f"{100.0 * share:.1f} %"
+
+
+def watts(power: float) -> str:
+    return f"{power:.3g} W"
+
+
+def clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
+
+
+def redraw(context: bpy.types.Context) -> None:
+    """Draw the panel and the status bar anew, and nothing that costs more."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if (area.type, region.type) in {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}:
+                    region.tag_redraw()
+        window.workspace.status_text_set(_draw_status if BakeJob.running is not None else None)
+
+
+def _what_is_baked(context: bpy.types.Context) -> str:
+    selected = sum(candidate.type == "MESH" for candidate in context.selected_objects)
+    if selected == 0:
+        return "Bakes all mesh objects"
+    return f"Bakes {_objects('selected object', selected)}"
+
+
+def _objects(noun: str, count: int) -> str:
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
+def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:
+    row = layout.row(align=True)
+    row.scale_y = 1.5
+    row.progress(factor=job.progress.fraction, text=_stage(job))
+    row.operator("object.radiosity_cancel", icon="X", text="")
+    column = layout.column(align=True)
+    for text in _figures(job):
+        column.label(text=text)
+
+
+def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
+    job, layout = BakeJob.running, header.layout
+    if job is None:
+        return
+    layout.label(icon="EVENT_ESC")
+    layout.label(text="Cancel Bake")
+    layout.separator_spacer()
+    bar = layout.row()
+    bar.ui_units_x = 16
+    bar.progress(factor=job.progress.fraction, text=_stage(job))
+    layout.label(text="   ".join(_figures(job)))
+    layout.separator_spacer()
+
+
+def _stage(job: BakeJob) -> str:
+    if job.cancelling:
+        return "Cancelling"
+    if job.poll():
+        return "Waiting for Object Mode"
+    return f"{job.progress.stage.capitalize() or 'Starting'} {100.0 * job.progress.fraction:.0f} %"
+
+
+def _figures(job: BakeJob) -> list[str]:
+    time = f"{clock(job.elapsed)} so far"
+    if job.remaining is not None:
+        time += f", about {clock(job.remaining)} left"
+    error = job.progress.error
+    return [time, "No estimate of the error yet" if error is None else f"Estimated error {percent(error)}"]
+
+
+def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
+    """A text over as many lines as the region's width calls for; Blender's own labels cut it off."""
+    width = context.region.width / context.preferences.system.ui_scale
+    for line in textwrap.wrap(text, max(20, int(width / PIXELS_PER_LETTER) - 6)):
+        layout.label(text=line, icon=icon)
+        icon = "NONE" if icon == "NONE" else "BLANK1"
+
+
+def _panels() -> list[type]:
+    """A panel for every section in every place, parents before their children."""
+    made = []
+    for place, where in PLACES.items():
+        main = f"{place}_PT_radiosity"
+        for section in (BakeSection, LastBakeSection, EffectsSection, AdvancedSection):
+            name = main if section is BakeSection else f"{main}_{section.__name__.removesuffix('Section').lower()}"
+            about = dict(where, bl_idname=name)
+            if section is not BakeSection:
+                about["bl_parent_id"] = main
+            elif place == "RENDER":
+                about["bl_options"] = {"DEFAULT_CLOSED"}
+            made.append(type(name, (section, bpy.types.Panel), about))
+    return made
+
+
+PANELS = _panels()
+
+
+def register() -> None:
+    for panel in PANELS:
+        bpy.utils.register_class(panel)
+
+
+def unregister() -> None:
+    for panel in reversed(PANELS):
+        bpy.utils.unregister_class(panel)

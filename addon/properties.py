@@ -1,0 +1,209 @@
+"""What a person may set in the panel, kept in the scene, and how it becomes `core.settings.Settings`."""
+
+import json
+from functools import lru_cache
+from typing import Any
+
+import bpy
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
+
+from ..core import settings as core
+from . import viewport
+
+LAYER_ITEMS = [
+    ("combined", "Combined", "Emitted plus reflected light: what the surface looks like"),
+    ("light", "Light", "The light that arrives, without the surface's own colour"),
+    ("direct", "Direct", "Reflected light that came straight from lamps, emitting surfaces and the sky"),
+    ("indirect", "Indirect", "Reflected light that bounced at least once"),
+    ("emission", "Emission", "The light the surface gives off by itself"),
+    ("sky", "Sky", "Reflected light that came straight from the sky"),
+    ("error", "Error", "How far the combined light may be off, as the bake itself estimates it"),
+]
+
+GOAL_ITEMS = [
+    ("ERROR", "Accuracy", "Bake until the estimated error is as small as asked"),
+    ("SECONDS", "Time", "Make the best of a given time"),
+]
+
+RESULT_ITEMS = [
+    ("NEW", "New Object", "Leave the objects alone, and add a tessellated copy of each that carries the light"),
+    ("REPLACE", "Replace", "Tessellate the objects' own meshes, and write the light to them"),
+    ("KEEP", "Keep Topology", "Write the light to the corners the meshes have, without adding any"),
+]
+
+DENSITY_ITEMS = [
+    ("TRIANGLES", "Triangles", "Choose the size of the triangles so that about this many result"),
+    ("SIZE", "Longest Edge", "Split triangles until no edge is longer than this"),
+]
+
+ESTIMATOR_ITEMS = [
+    ("auto", "Automatic", "Choose by the number of patches"),
+    ("hemisphere", "Hemisphere", "Cast rays over each patch's hemisphere: cost grows in line with the patches"),
+    ("analytic", "Analytic", "Lambert's exact formula for every pair of patches: smooth, for small scenes"),
+    ("centroid", "Centroid", "The classic formula between centres: wrong where surfaces meet, for comparison only"),
+]
+
+
+def _show_layer(settings: "RadiosityBakerSettings", _context: bpy.types.Context) -> None:
+    report = settings.last_report()
+    if report:
+        viewport.show_layer(settings.id_data, report, settings.layer)
+
+
+class RadiosityBakerSettings(bpy.types.PropertyGroup):
+    """`scene.radiosity_baker`: the settings of the next bake and the report of the last."""
+
+    goal: EnumProperty(
+        name="Bake for",
+        description="What ends the bake: an accuracy that is reached, or a time that is up",
+        items=GOAL_ITEMS,
+        default="ERROR",
+    )
+    error: FloatProperty(
+        name="Error",
+        description="How far the baked light may be off on average, compared with the mean light of the surfaces",
+        subtype="PERCENTAGE",
+        default=2.0,
+        min=0.1,
+        soft_min=0.5,
+        max=100.0,
+        soft_max=20.0,
+        precision=1,
+    )
+    seconds: FloatProperty(
+        name="Time",
+        description="How long the bake may take",
+        subtype="TIME_ABSOLUTE",
+        unit="TIME_ABSOLUTE",
+        default=10.0,
+        min=0.1,
+        soft_min=1.0,
+        soft_max=600.0,
+        step=100,
+        precision=1,
+    )
+    result: EnumProperty(
+        name="Result",
+        description="Where the baked light goes",
+        items=RESULT_ITEMS,
+        default="NEW",
+    )
+    density: EnumProperty(
+        name="Tessellation",
+        description="How finely the objects are split, so that their vertices can hold shadows",
+        items=DENSITY_ITEMS,
+        default="TRIANGLES",
+    )
+    triangles: IntProperty(
+        name="Count",
+        description="About how many triangles all baked objects have together after the split",
+        default=core.Settings.triangles,
+        min=100,
+        soft_max=500_000,
+        max=20_000_000,
+        step=1000,
+    )
+    size: FloatProperty(
+        name="Length",
+        description="The longest edge a triangle may have after the split",
+        subtype="DISTANCE",
+        unit="LENGTH",
+        default=0.1,
+        min=0.0001,
+        soft_min=0.005,
+        soft_max=10.0,
+    )
+    estimator: EnumProperty(
+        name="Form Factors",
+        description="How the exchange of light between the patches is computed",
+        items=ESTIMATOR_ITEMS,
+        default="auto",
+    )
+    seed: IntProperty(
+        name="Seed",
+        description="Start of the random numbers: the same seed gives the same bake, to the last bit",
+        default=core.Settings.seed,
+        min=0,
+    )
+    threads: IntProperty(
+        name="Threads",
+        description="Number of processor cores to use; 0 uses all of them",
+        default=core.Settings.threads,
+        min=0,
+        soft_max=64,
+        max=1024,
+    )
+    layers: EnumProperty(
+        name="Layers",
+        description="Kinds of light to store in colour attributes of their own (hold Shift to choose several). "
+        "Combined is always among them",
+        items=LAYER_ITEMS,
+        options={"ENUM_FLAG"},
+        default={"combined"},
+    )
+    attribute: StringProperty(
+        name="Attribute",
+        description="Name of the colour attribute that holds the combined light; the other layers add theirs to it",
+        default="Radiosity",
+        maxlen=50,
+    )
+    show_when_done: BoolProperty(
+        name="Show When Done",
+        description="Show the baked light in the viewport as soon as it is there",
+        default=True,
+    )
+    layer: EnumProperty(
+        name="Layer",
+        description="The layer that the viewport shows on the baked objects",
+        items=LAYER_ITEMS,
+        default="combined",
+        update=_show_layer,
+    )
+    report: StringProperty(
+        name="Report",
+        description="What the last bake did, as the report.json of the command line",
+        options={"HIDDEN"},
+    )
+
+    def to_core(self) -> core.Settings:
+        """The settings as `core.bake` takes them: lengths in metres, errors as a share of one."""
+        return core.Settings(
+            tessellate=self.result != "KEEP",
+            size=self.size if self.density == "SIZE" else None,
+            triangles=self.triangles,
+            error=self.error / 100.0 if self.goal == "ERROR" else None,
+            seconds=self.seconds if self.goal == "SECONDS" else None,
+            estimator=self.estimator,
+            seed=self.seed,
+            threads=self.threads,
+            layers=tuple(layer for layer in core.LAYERS if layer == "combined" or layer in self.layers),
+        )
+
+    def result_mode(self) -> str:
+        """The result as the attribute writer names it."""
+        return self.result.lower()
+
+    def remember(self, report: dict[str, Any]) -> None:
+        """Keep a bake's report with the scene, where undo and saving take it along."""
+        self.report = json.dumps(report)
+        self.layer = "combined"
+
+    def last_report(self) -> dict[str, Any] | None:
+        """The report of the last bake, or None before the first."""
+        return _parsed(self.report) if self.report else None
+
+
+@lru_cache(maxsize=4)
+def _parsed(report: str) -> dict[str, Any]:
+    # The panel asks on every redraw.
+    return json.loads(report)
+
+
+def register() -> None:
+    bpy.utils.register_class(RadiosityBakerSettings)
+    bpy.types.Scene.radiosity_baker = PointerProperty(type=RadiosityBakerSettings)
+
+
+def unregister() -> None:
+    del bpy.types.Scene.radiosity_baker
+    bpy.utils.unregister_class(RadiosityBakerSettings)
