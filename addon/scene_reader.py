@@ -1,0 +1,339 @@
+"""From Blender's evaluated scene to core.scene: every object that a render shows, as triangles in world space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ..core.scene import Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, Surface
+from .lamps import read_lamp
+from .materials import DEFAULT_SURFACE, read_material, read_world
+from .render_visibility import rendered_objects, shown_as_rendered
+
+#: Custom property of a baked copy (result `new`): the object it was made from.
+ORIGINAL_KEY = "radiosity_baker_original"
+
+
+@dataclass(frozen=True, eq=False)
+class ReceiverSource:
+    """Where a receiver's triangles come from, without holding on to Blender's data.
+
+    name: of the object and of its SceneObject. session_uid: Blender's number for it, which survives renaming and undo.
+    corners (t, 3) int32: the mesh corner (loop) of each corner of SceneObject.triangles. polygons (t,) int32: the face
+    each came from. flipped: corners were put in reverse order, since a negative scale mirrors the object.
+    corner_count and vertex_count tell whether the mesh was edited meanwhile.
+    """
+
+    name: str
+    session_uid: int
+    corners: Int32
+    polygons: Int32
+    flipped: bool
+    corner_count: int
+    vertex_count: int
+
+
+def pick_receivers(
+    scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, names: Sequence[str] | None
+) -> list[bpy.types.Object]:
+    """The objects to bake: the named ones, else the selected meshes, else every mesh that a render shows.
+
+    Raises SceneError when a name is unknown or no mesh, when an object is hidden from rendering, or when there is none.
+    """
+    rendered = rendered_objects(view_layer)
+    if names is not None:
+        picked = [_named(scene, view_layer, name) for name in names]
+    else:
+        picked = [obj for obj in view_layer.objects if obj.type == "MESH" and obj.select_get(view_layer=view_layer)]
+    if not picked:
+        covered = _covered(rendered, picked)
+        picked = [obj for obj in view_layer.objects if obj.type == "MESH" and obj in rendered and obj not in covered]
+    if not picked:
+        raise SceneError(
+            f"Scene '{scene.name}' has no mesh object that is visible to rendering: add one, or switch its camera icon "
+            "on in the Outliner."
+        )
+    for obj in picked:
+        _check_rendered(obj, rendered)
+    return picked
+
+
+def read_scene(
+    depsgraph: bpy.types.Depsgraph, receivers: Sequence[bpy.types.Object], *, tessellate: bool
+) -> tuple[Scene, list[ReceiverSource]]:
+    """The scene as a render shows it, and for each receiver where its triangles come from, in Scene.receivers' order.
+
+    receivers: original mesh objects. tessellate: the light goes to a mesh of its own; without it, to the corners of the
+    receiver's own mesh, which must then have the same corners before and after its modifiers.
+    Raises SceneError when a receiver cannot be baked, a coordinate is not a number, or nothing shines.
+    """
+    view_layer = depsgraph.view_layer
+    rendered = rendered_objects(view_layer)
+    for obj in receivers:
+        _check_rendered(obj, rendered)
+        if obj.mode == "EDIT":
+            obj.update_from_editmode()
+    reading = _Reading(set(receivers), rendered - _covered(rendered, receivers))
+    with shown_as_rendered(view_layer):
+        depsgraph.update()
+        for instance in depsgraph.object_instances:
+            reading.add(instance)
+        if not tessellate:
+            for obj in receivers:
+                check_same_corners(obj, obj.evaluated_get(depsgraph).data)
+    sky, warnings = read_world(depsgraph.scene_eval.world)
+    scene = Scene(
+        objects=tuple(reading.objects),
+        surfaces=tuple(reading.surfaces.all),
+        lamps=tuple(reading.lamps),
+        sky=sky,
+        warnings=tuple(dict.fromkeys([*reading.warnings, *reading.surfaces.warnings, *warnings])),
+    )
+    _check_receivers(receivers, reading.sources)
+    _check_light(scene, depsgraph.scene.name)
+    return scene, reading.sources
+
+
+def check_same_corners(obj: bpy.types.Object, evaluated: bpy.types.Mesh) -> None:
+    """Raise SceneError unless a mesh has the same faces, corner by corner, before and after its modifiers."""
+    before, after = obj.data, evaluated
+    if len(before.loops) == len(after.loops) and len(before.polygons) == len(after.polygons):
+        same_vertices = np.array_equal(*(_integers(mesh.loops, "vertex_index") for mesh in (before, after)))
+        if same_vertices and np.array_equal(*(_integers(mesh.polygons, "loop_start") for mesh in (before, after))):
+            return
+    raise SceneError(
+        f"Object '{obj.name}' has modifiers that change its faces, so the light has no corners to go to: choose the "
+        "result New Object, or apply the modifiers."
+    )
+
+
+class _Reading:
+    """What has been read so far. Each mesh is converted once, however many instances show it."""
+
+    def __init__(self, receivers: set[bpy.types.Object], rendered: set[bpy.types.Object]) -> None:
+        self.receivers = receivers
+        self.rendered = rendered
+        self.objects: list[SceneObject] = []
+        self.sources: list[ReceiverSource] = []
+        self.lamps: list[Lamp] = []
+        self.surfaces = _SurfaceTable()
+        self.warnings: list[str] = []
+        self._meshes: dict[int, _LocalMesh] = {}
+
+    def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
+        # Curves, texts, surfaces and metaballs come a second time, as the mesh that they evaluate to.
+        obj = instance.object
+        if obj.type in {"MESH", "LIGHT"} and _renders(instance, self.rendered):
+            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            name = f"{instance.parent.name}/{obj.name}" if instance.is_instance else obj.name_full
+            if obj.type == "MESH":
+                self._add_mesh(instance, name, matrix)
+            elif obj.visible_diffuse:
+                lamp, warnings = read_lamp(name, obj.data, matrix)
+                self.warnings += warnings
+                self.lamps += [lamp] if lamp is not None else []
+
+    def _add_mesh(self, instance: bpy.types.DepsgraphObjectInstance, name: str, matrix: Float64) -> None:
+        obj = instance.object
+        receives = not instance.is_instance and obj.original in self.receivers
+        if not (receives or obj.visible_diffuse or obj.visible_shadow):
+            return
+        if not (obj.visible_diffuse and obj.visible_shadow):
+            self.warnings.append(
+                f"Object '{name}' is visible to some rays only (Ray Visibility): all see it in the bake."
+            )
+        mesh = self._mesh(obj.data)
+        if not len(mesh.corners):
+            return
+        if not np.isfinite(mesh.vertices).all() or not np.isfinite(matrix).all():
+            raise SceneError(
+                f"Object '{name}' has coordinates that are not numbers (NaN or infinite): delete those vertices, or "
+                "check its modifiers."
+            )
+        flipped = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
+        turn = [0, 2, 1] if flipped else [0, 1, 2]
+        self.objects.append(
+            SceneObject(
+                name,
+                vertices=mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3],
+                triangles=mesh.triangles[:, turn],
+                surface=self.surfaces.of_faces(obj, mesh.material_index),
+                corner_normals=_world_normals(mesh.corner_normals, matrix[:3, :3], turn),
+                receives=receives,
+            )
+        )
+        if receives:
+            self.sources.append(
+                ReceiverSource(
+                    name,
+                    obj.original.session_uid,
+                    mesh.corners[:, turn],
+                    mesh.polygons,
+                    flipped,
+                    corner_count=len(obj.data.loops),
+                    vertex_count=len(mesh.vertices),
+                )
+            )
+
+    def _mesh(self, mesh: bpy.types.Mesh) -> _LocalMesh:
+        key = mesh.as_pointer()
+        if key not in self._meshes:
+            self._meshes[key] = _LocalMesh.read(mesh)
+        return self._meshes[key]
+
+
+@dataclass(frozen=True, eq=False)
+class _LocalMesh:
+    """A mesh as arrays, in its object's space.
+
+    vertices (v, 3) float64; triangles, corners (t, 3), polygons, material_index (t,) int32; corner_normals (t, 3, 3)
+    float32, or None where every face is flat.
+    """
+
+    vertices: Float64
+    triangles: Int32
+    corners: Int32
+    polygons: Int32
+    material_index: Int32
+    corner_normals: Float32 | None
+
+    @staticmethod
+    def read(mesh: bpy.types.Mesh) -> _LocalMesh:
+        mesh.calc_loop_triangles()
+        corners = _integers(mesh.loop_triangles, "loops", 3)
+        polygons = _integers(mesh.loop_triangles, "polygon_index")
+        normals = None
+        if mesh.normals_domain != "FACE":
+            normals = _floats(mesh.corner_normals, "vector", 3)[corners]
+        return _LocalMesh(
+            vertices=_floats(mesh.vertices, "co", 3).astype(np.float64),
+            triangles=_integers(mesh.loops, "vertex_index")[corners],
+            corners=corners,
+            polygons=polygons,
+            material_index=_integers(mesh.polygons, "material_index")[polygons],
+            corner_normals=normals,
+        )
+
+
+class _SurfaceTable:
+    """Surfaces of the scene, one per material that some face uses."""
+
+    def __init__(self) -> None:
+        self.all: list[Surface] = []
+        self.warnings: list[str] = []
+        self._index: dict[str | None, int] = {}
+
+    def of_faces(self, obj: bpy.types.Object, material_index: Int32) -> Int32:
+        """Surface of each face, (t,) int32. As in Cycles, indices beyond the last slot mean the last slot."""
+        materials = _materials(obj)
+        slot = np.clip(material_index, 0, len(materials) - 1)
+        surface = np.zeros(len(materials), np.int32)
+        for used in np.unique(slot):
+            surface[used] = self._of(materials[used])
+        return surface[slot]
+
+    def _of(self, material: bpy.types.Material | None) -> int:
+        key = None if material is None else material.name_full
+        if key not in self._index:
+            surface, warnings = (DEFAULT_SURFACE, []) if material is None else read_material(material)
+            self._index[key] = len(self.all)
+            self.all.append(surface)
+            self.warnings += warnings
+        return self._index[key]
+
+
+def _materials(obj: bpy.types.Object) -> list[bpy.types.Material | None]:
+    """Materials by slot. Evaluated meshes may have slots that their object lacks; without any, the default surface."""
+    materials = list(obj.data.materials)
+    for index, slot in enumerate(obj.material_slots[: len(materials)]):
+        if slot.link == "OBJECT":
+            materials[index] = slot.material
+    return materials or [None]
+
+
+def _renders(instance: bpy.types.DepsgraphObjectInstance, rendered: set[bpy.types.Object]) -> bool:
+    original = instance.object.original
+    if not instance.is_instance:
+        return original in rendered and (original.show_instancer_for_render or not original.is_instancer)
+    # Collections leave out what is hidden; geometry nodes show what they are told to.
+    hidden = instance.parent.instance_type != "NONE" and original.hide_render
+    return instance.parent.original in rendered and not hidden
+
+
+def _covered(rendered: set[bpy.types.Object], receivers: Sequence[bpy.types.Object]) -> set[bpy.types.Object]:
+    """Where a baked copy and its original both show, one of the two lies within the other: the one to leave out."""
+    covered = set()
+    for copy in rendered:
+        original = copy.get(ORIGINAL_KEY)
+        if original in rendered:
+            covered.add(original if copy in receivers and original not in receivers else copy)
+    return covered
+
+
+def _world_normals(normals: Float32 | None, linear: Float64, turn: list[int]) -> Float32 | None:
+    """Unit normals (t, 3, 3) under a linear map, by its inverse transpose; corners in the order `turn`."""
+    if normals is None:
+        return None
+    a, b, c = linear.T
+    # Columns of the cofactor matrix: the inverse transpose times the determinant, and defined where that is zero.
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    if np.linalg.det(linear) < 0.0:
+        cofactors = -cofactors
+    turned = normals[:, turn] @ cofactors.T
+    length = np.linalg.norm(turned, axis=2, keepdims=True)
+    return np.divide(turned, length, out=np.zeros_like(turned), where=length > 0.0).astype(np.float32)
+
+
+def _named(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, name: str) -> bpy.types.Object:
+    obj = view_layer.objects.get(name)
+    if obj is None:
+        elsewhere = name in bpy.data.objects
+        remedy = "put it into a collection that is not excluded" if elsewhere else "check the spelling"
+        raise SceneError(
+            f"There is no object '{name}' in view layer '{view_layer.name}' of scene '{scene.name}': {remedy}."
+        )
+    if obj.type != "MESH":
+        raise SceneError(
+            f"Object '{name}' is not a mesh ({obj.type.lower()}), so it has no colour attribute: convert it to a mesh "
+            "(Object > Convert), or leave it out."
+        )
+    return obj
+
+
+def _check_rendered(obj: bpy.types.Object, rendered: set[bpy.types.Object]) -> None:
+    if obj not in rendered:
+        raise SceneError(
+            f"Object '{obj.name}' is hidden from rendering: switch the camera icon of it and its collections on in the "
+            "Outliner, or leave it out."
+        )
+
+
+def _check_receivers(receivers: Sequence[bpy.types.Object], sources: list[ReceiverSource]) -> None:
+    read = {source.session_uid for source in sources}
+    for obj in receivers:
+        if obj.session_uid not in read:
+            raise SceneError(f"Object '{obj.name}' has no faces that render: give it some, or leave it out.")
+
+
+def _check_light(scene: Scene, name: str) -> None:
+    used = {int(index) for obj in scene.objects for index in np.unique(obj.surface)}
+    if not scene.lamps and not any(scene.sky) and not any(any(scene.surfaces[index].emission) for index in used):
+        raise SceneError(
+            f"Scene '{name}' has no light, so all would be black: add a lamp, give a material emission, or give the "
+            "world a colour."
+        )
+
+
+def _integers(collection: bpy.types.bpy_prop_collection, name: str, width: int = 1) -> Int32:
+    values = np.empty(len(collection) * width, np.int32)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, width) if width > 1 else values
+
+
+def _floats(collection: bpy.types.bpy_prop_collection, name: str, width: int) -> Float32:
+    values = np.empty(len(collection) * width, np.float32)
+    collection.foreach_get(name, values)
+    return values.reshape(-1, width)
