@@ -6,8 +6,9 @@ look outward. Lengths are metres, angles degrees, colours linear RGB, light in w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import radians
 from pathlib import Path
 
@@ -84,6 +85,198 @@ def polygons(
     return Shape(np.array(vertices, dtype=float), faces, materials, [smooth] * len(faces))
 
 
+# Solids
+
+
+def box(size: Point, material: bpy.types.Material, top: bpy.types.Material | None = None) -> Shape:
+    """A cuboid standing on z = 0, centred on x = y = 0; its upper face may have a material of its own."""
+    x, y, z = (extent / 2.0 for extent in size)
+    corners = [(i * x, j * y, z + k * z) for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]
+    faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return polygons(corners, faces, [*[material] * 5, top or material])
+
+
+def rounded_box(
+    size: Point, radius: float, material: bpy.types.Material, *, steps: int = 3, flat: int = 2, bulge: float = 0.0
+) -> Shape:
+    """A smooth cuboid with rounded edges, standing on z = 0: a cushion when it bulges (and grows by twice the bulge).
+
+    steps: faces across the rounding of an edge; flat: faces along what stays between two roundings;
+    bulge: how far the middles of the six sides swell, metres.
+    """
+    half = np.array(size) / 2.0
+    inner = half - radius
+    arc = np.tan(np.linspace(-np.pi / 4.0, 0.0, steps + 1))
+    grid = np.concatenate([arc - 1.0, np.linspace(-1.0, 1.0, flat + 1)[1:-1], 1.0 - arc[::-1]])
+    # Between -1 and 1 the grid spans the inner cuboid; from there to -2 and 2 it spans the rounding.
+    place, faces = _cube_grid(len(grid) - 1)
+    on_grid = grid[place]
+    core = np.clip(on_grid, -1.0, 1.0)
+    outside = on_grid - core
+    normal = outside / np.linalg.norm(outside, axis=1, keepdims=True)
+    middle = np.prod(np.where(np.abs(on_grid) > 1.999, 1.0, 1.0 - (on_grid / 2.0) ** 2), axis=1, keepdims=True)
+    vertices = core * inner + normal * (radius + bulge * middle)
+    return polygons(vertices, faces, material, smooth=True).moved(z=half[2] + bulge)
+
+
+def _cube_grid(n: int) -> tuple[np.ndarray, list[tuple[int, ...]]]:
+    """The surface of a cube of n x n faces a side: the grid indices (vertices, 3) of its vertices, and its faces."""
+    index: dict[tuple[int, int, int], int] = {}
+    faces = []
+    for axis in range(3):
+        for end in (0, n):
+            for i in range(n):
+                for j in range(n):
+                    ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+                    cells = [tuple(np.roll((end, u, v), axis).tolist()) for u, v in (ring if end else ring[::-1])]
+                    faces.append(tuple(index.setdefault(cell, len(index)) for cell in cells))
+    return np.array(list(index)), faces
+
+
+def prism(outline: Sequence[tuple[float, float]], depth: float, material: bpy.types.Material) -> Shape:
+    """A flat outline (counter-clockwise in x, y) raised from z = 0 to depth."""
+    n = len(outline)
+    vertices = [(x, y, z) for z in (0.0, depth) for x, y in outline]
+    sides = [(k, (k + 1) % n, (k + 1) % n + n, k + n) for k in range(n)]
+    return polygons(vertices, [tuple(range(n))[::-1], tuple(range(n, 2 * n)), *sides], material).facing_outward()
+
+
+def lattice(
+    x_cuts: Sequence[float],
+    y_cuts: Sequence[float],
+    depth: float,
+    cell: Callable[[int, int], bpy.types.Material | None],
+) -> Shape:
+    """A slab from z = 0 to depth, cut into cells: each a material, or None for a hole through the slab."""
+    columns, rows = len(x_cuts) - 1, len(y_cuts) - 1
+    cells = {(i, j): cell(i, j) for i in range(columns) for j in range(rows)}
+    index: dict[tuple[int, int, int], int] = {}
+    faces, materials = [], []
+
+    def add(corners: list[tuple[int, int, int]], material: bpy.types.Material) -> None:
+        faces.append(tuple(index.setdefault(corner, len(index)) for corner in corners))
+        materials.append(material)
+
+    for (i, j), material in cells.items():
+        if material is None:
+            continue
+        ring = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)]
+        add([(u, v, 1) for u, v in ring], material)
+        add([(u, v, 0) for u, v in ring[::-1]], material)
+        for k, neighbour in enumerate([(i, j - 1), (i + 1, j), (i, j + 1), (i - 1, j)]):
+            if cells.get(neighbour) is None:
+                a, b = ring[k], ring[(k + 1) % 4]
+                add([(*a, 0), (*b, 0), (*b, 1), (*a, 1)], material)
+    vertices = [(x_cuts[i], y_cuts[j], k * depth) for i, j, k in index]
+    return polygons(vertices, faces, materials)
+
+
+def lathe(
+    profile: Sequence[tuple[float, float]],
+    material: bpy.types.Material | list[bpy.types.Material],
+    segments: int = 32,
+    *,
+    ring: bool = False,
+) -> Shape:
+    """A profile of (radius, height) turned about the vertical, smooth. It starts and ends on the axis (radius 0), or,
+    as a ring, returns from its last point to its first. One material, or one for each step of the profile."""
+    angles = np.arange(segments) * 2.0 * np.pi / segments
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    vertices: list[Point] = []
+    rows = []
+    for radius, height in profile:
+        points = [(0.0, 0.0, height)] if radius == 0.0 else [(radius * x, radius * y, height) for x, y in circle]
+        rows.append(range(len(vertices), len(vertices) + len(points)))
+        vertices += points
+    steps = list(zip(rows, rows[1:] + rows[:1], strict=True)) if ring else list(pairwise(rows))
+    given = material if isinstance(material, list) else [material] * len(steps)
+    faces, materials = [], []
+    for (low, high), step_material in zip(steps, given, strict=True):
+        for k in range(segments):
+            corners = (low[k % len(low)], low[(k + 1) % len(low)], high[(k + 1) % len(high)], high[k % len(high)])
+            faces.append(tuple(dict.fromkeys(corners)))
+            materials.append(step_material)
+    return polygons(vertices, faces, materials, smooth=True).facing_outward()
+
+
+def sphere(radius: float, material: bpy.types.Material, segments: int = 24) -> Shape:
+    """A ball standing on z = 0."""
+    angles = np.linspace(-np.pi / 2.0, np.pi / 2.0, segments // 2 + 1)
+    profile = [(radius * np.cos(a), radius + radius * np.sin(a)) for a in angles[1:-1]]
+    return lathe([(0.0, 0.0), *profile, (0.0, 2.0 * radius)], material, segments)
+
+
+def tube(
+    points: np.ndarray, radius: float, material: bpy.types.Material, sides: int = 12, *, closed: bool = False
+) -> Shape:
+    """A smooth round tube along points (n, 3), with flat ends, or closed into a loop.
+
+    The frame is carried along the curve without twisting (double reflection, Wang et al. 2008); what a loop has turned
+    by when it comes back is taken out evenly.
+    """
+    n = len(points)
+    ahead, behind = np.roll(points, -1, axis=0), np.roll(points, 1, axis=0)
+    if not closed:
+        ahead[-1], behind[0] = points[-1], points[0]
+    tangents = (ahead - behind) / np.linalg.norm(ahead - behind, axis=1, keepdims=True)
+    across = _carried_normals(points, tangents, n + 1 if closed else n)
+    up = np.cross(tangents, across[:n])
+    turn = np.arctan2(across[-1] @ up[0], across[-1] @ across[0]) / n if closed else 0.0
+    angles = np.arange(sides) * 2.0 * np.pi / sides - turn * np.arange(n)[:, None]
+    rings = points[:, None] + radius * (
+        np.cos(angles)[..., None] * across[:n, None] + np.sin(angles)[..., None] * up[:, None]
+    )
+    faces = _grid_faces(n if closed else n - 1, sides, wrap_rows=n)
+    if not closed:
+        faces += [tuple(range(sides))[::-1], tuple(range((n - 1) * sides, n * sides))]
+    return polygons(rings.reshape(-1, 3), faces, material, smooth=True).facing_outward()
+
+
+def _carried_normals(points: np.ndarray, tangents: np.ndarray, count: int) -> np.ndarray:
+    start = np.cross(tangents[0], np.eye(3)[np.argmin(np.abs(tangents[0]))])
+    normals = [start / np.linalg.norm(start)]
+    for k in range(count - 1):
+        here, there = k, (k + 1) % len(points)
+        step = points[there] - points[here]
+        step /= np.linalg.norm(step)
+        reflected, tangent = (v - 2.0 * (step @ v) * step for v in (normals[-1], tangents[here]))
+        rest = tangents[there] - tangent
+        length = rest @ rest
+        normals.append(reflected - 2.0 * (rest @ reflected) / length * rest if length > 1e-18 else reflected)
+    return np.array(normals)
+
+
+def _grid_faces(rows: int, columns: int, wrap_rows: int) -> list[tuple[int, ...]]:
+    """Quads of a grid whose columns close into rings; row indices wrap at wrap_rows."""
+    return [
+        tuple(r % wrap_rows * columns + c % columns for r, c in ((i, j), (i, j + 1), (i + 1, j + 1), (i + 1, j)))
+        for i in range(rows)
+        for j in range(columns)
+    ]
+
+
+def sheet(points: np.ndarray, thickness: float, material: bpy.types.Material) -> Shape:
+    """A smooth cloth, leaf or shell around the surface through points (n, m, 3), half the thickness to each side."""
+    n, m, _ = points.shape
+    along, across = np.gradient(points, axis=0), np.gradient(points, axis=1)
+    normals = np.cross(along, across)
+    normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+    layers = np.concatenate([(points + 0.5 * side * thickness * normals).reshape(-1, 3) for side in (1, -1)])
+    front = [
+        (i * m + j, (i + 1) * m + j, (i + 1) * m + j + 1, i * m + j + 1) for i in range(n - 1) for j in range(m - 1)
+    ]
+    back = [tuple(k + n * m for k in face[::-1]) for face in front]
+    left = [i * m for i in range(n)]
+    border = [
+        *left,
+        *range((n - 1) * m + 1, n * m),
+        *[i * m + m - 1 for i in range(n - 2, -1, -1)],
+        *range(m - 2, 0, -1),
+    ]
+    rim = [(a, a + n * m, b + n * m, b) for a, b in zip(border, border[1:] + border[:1], strict=True)]
+    return polygons(layers, front + back + rim, material, smooth=True).facing_outward()
+
+
 # Scene
 
 
@@ -116,6 +309,7 @@ def show(scene: bpy.types.Scene, view_transform: str, look: str = "None", exposu
 
 def save(path: Path, receivers: Sequence[bpy.types.Object]) -> None:
     """Write the scene with the receivers selected and every 3D view looking through the camera."""
+    bpy.context.view_layer.update()
     for obj in bpy.context.view_layer.objects:
         obj.select_set(obj in receivers)
     bpy.context.view_layer.objects.active = receivers[0]
