@@ -60,8 +60,9 @@ class SceneObject:
 class PointLamp:
     """A lamp that shines alike in all directions, from a point or a ball.
 
-    intensity: W/sr per channel, total over the ball. radius: metres; 0 is a point. facing_disc: the lamp is a disc that
-    turns to each receiver (Blender's "soft falloff") rather than a sphere.
+    intensity: W/sr per channel, total over the ball. radius: metres; 0 is a point, with irradiance I cos / d^2.
+    facing_disc: the lamp is a disc of that radius that turns to each receiver (Blender's "soft falloff") rather than a
+    sphere. Either has the radiance I / (pi radius^2).
     """
 
     name: str
@@ -73,8 +74,13 @@ class PointLamp:
 
 @dataclass(frozen=True)
 class SpotLamp:
-    """A point lamp behind a cone. axes: rows are the lamp's local x, y, z in world space, scaled as the lamp object is;
-    the lamp shines along -z. cone_angle: full angle in radians. blend: 0 hard edge, 1 soft from the axis outward."""
+    """A point lamp behind a cone.
+
+    axes: rows are the lamp's local x, y, z in world space, scaled as the lamp object is; the lamp shines along -z.
+    cone_angle: full angle h in radians. blend: 0 hard edge, 1 soft from the axis outward. A ray from any point of the
+    lamp has the local direction r = ray @ inv(axes), made a unit vector, and is dimmed by x x (3 - 2 x) with
+    x = (-r_z - cos(h/2)) / ((1 - cos(h/2)) blend) clipped to 0..1; from within a ball (facing_disc False) it is not.
+    """
 
     name: str
     position: Vector
@@ -88,8 +94,11 @@ class SpotLamp:
 
 @dataclass(frozen=True)
 class SunLamp:
-    """Parallel light. direction: the way the light travels. irradiance: W/m^2 on a plane that faces it.
-    angle: full angle of the sun's disc in radians; 0 gives hard shadows."""
+    """Parallel light.
+
+    direction: the way the light travels. irradiance: W/m^2 on a plane that faces it. angle: full angle of the sun's
+    disc in radians, up to pi; 0 gives hard shadows. Its radiance is even: irradiance / (pi sin^2(angle/2)).
+    """
 
     name: str
     direction: Vector
@@ -99,11 +108,13 @@ class SunLamp:
 
 @dataclass(frozen=True)
 class AreaLamp:
-    """A flat lamp that shines from one side, along cross(half_v, half_u)'s opposite: see `normal`.
+    """A flat lamp that shines from one side.
 
     half_u, half_v: from the centre to the middle of two neighbouring sides (or the ellipse's half axes).
-    normal: unit vector, the way it shines. radiance: W/(m^2 sr) along the normal.
-    spread: radians, pi for a plain diffuse emitter.
+    normal: unit vector at right angles to both, the way it shines; their cross product may be its opposite.
+    radiance: W/(m^2 sr), power / (pi area). spread: full angle of the beam in radians, pi for a plain diffuse emitter;
+    below that the radiance at an angle a to the normal is radiance * max(0, tan h - tan a) / (tan h - h), h = spread/2,
+    which keeps the power.
     """
 
     name: str
