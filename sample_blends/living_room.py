@@ -6,7 +6,6 @@ north wall (y = 4.2). Furniture is set a fraction of a millimetre apart, so that
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import pi
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from modelling import (
     add_mesh,
     box,
     diffuse,
+    hanging_cloth,
     join,
     lathe,
     lattice,
@@ -244,21 +244,10 @@ def curtains(cloth: Material, metal: Material) -> Shape:
         for y in (south + 0.015, north - 0.015)
     ]
     cloths = [
-        sheet(_folds(x, south + 0.05, south + 0.57), 0.004, cloth),
-        sheet(_folds(x, north - 0.57, north - 0.05), 0.004, cloth),
+        hanging_cloth(0.52, top - 0.04, 6, 0.052, cloth).turned(90.0).moved(x, y, 0.02)
+        for y in (south + 0.31, north - 0.31)
     ]
     return join([rod, *ends, *brackets, *cloths])
-
-
-def _folds(x: float, south: float, north: float) -> np.ndarray:
-    """A gathered cloth (n, m, 3): six folds in y, deeper towards the floor, a little irregular."""
-    across, height = np.linspace(0.0, 1.0, 49), np.linspace(0.02, 2.425, 6)
-    u, z = np.meshgrid(across, height, indexing="ij")
-    fall = 1.0 - z / height[-1]
-    phase = 12.0 * pi * u + 0.7 * np.sin(5.0 * u + 2.0 * fall)
-    depth = (0.022 + 0.03 * fall**0.7) * (1.0 + 0.25 * np.sin(9.0 * u))
-    y = south + (north - south) * u + 0.008 * fall * np.sin(phase * 0.5)
-    return np.stack([x + depth * np.cos(phase), y, z], axis=-1)
 
 
 # The furniture
@@ -319,9 +308,12 @@ def pouf(cloth: Material) -> Shape:
     angles = np.linspace(-pi / 2.0, pi / 2.0, 13)
     belly = [(0.17 + 0.12 * np.cos(a), 0.17 + 0.17 * np.sin(a)) for a in angles]
     stool = lathe([(0.0, 0.0), *belly, (0.09, 0.348), (0.0, 0.35)], cloth, 64)
-    x, y, z = stool.vertices.T
-    rib = 1.0 + 0.035 * np.cos(16.0 * np.arctan2(y, x)) * np.clip(np.hypot(x, y) / 0.2, 0.0, 1.0)
-    return replace(stool, vertices=np.column_stack([x * rib, y * rib, z]))
+
+    def gather(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
+        rib = 1.0 + 0.035 * np.cos(16.0 * np.arctan2(y, x)) * np.clip(np.hypot(x, y) / 0.2, 0.0, 1.0)
+        return x * rib, y * rib, z
+
+    return stool.reshaped(gather)
 
 
 def low_table(wood: Material) -> Shape:

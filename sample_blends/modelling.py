@@ -43,6 +43,10 @@ class Shape:
     def scaled(self, x: float, y: float, z: float) -> Shape:
         return replace(self, vertices=self.vertices * (x, y, z))
 
+    def reshaped(self, place: Callable[[np.ndarray, np.ndarray, np.ndarray], Sequence[np.ndarray]]) -> Shape:
+        """The same faces with every vertex moved: place takes and returns the arrays x, y, z."""
+        return replace(self, vertices=np.column_stack(place(*self.vertices.T)))
+
     def facing_outward(self) -> Shape:
         """The same closed shape with its faces turned round if they looked inward (negative volume)."""
         return self if _volume(self.vertices, self.faces) > 0 else self.facing_back()
@@ -277,6 +281,31 @@ def sheet(points: np.ndarray, thickness: float, material: bpy.types.Material) ->
     return polygons(layers, front + back + rim, material, smooth=True).facing_outward()
 
 
+def hanging_cloth(
+    width: float, height: float, folds: int, depth: float, material: bpy.types.Material, thickness: float = 0.004
+) -> Shape:
+    """A gathered curtain along x, centred, from z = 0 to height: a little irregular, folded deeper towards the floor."""
+    u, z = np.meshgrid(np.linspace(0.0, 1.0, 8 * folds + 1), np.linspace(0.0, height, 6), indexing="ij")
+    fall = 1.0 - z / height
+    phase = 2.0 * np.pi * folds * u + 0.7 * np.sin(5.0 * u + 2.0 * fall)
+    swing = depth * (0.42 + 0.58 * fall**0.7) * (1.0 + 0.25 * np.sin(9.0 * u))
+    x = width * (u - 0.5 + 0.015 * fall * np.sin(phase * 0.5))
+    return sheet(np.stack([x, swing * np.cos(phase), z], axis=-1), thickness, material)
+
+
+def curve(points: Sequence[tuple[float, float]], steps: int) -> list[tuple[float, float]]:
+    """A smooth line through points (Catmull-Rom), each span cut into steps: soft profiles for a lathe."""
+    given = np.array(points)
+    padded = np.concatenate([[2.0 * given[0] - given[1]], given, [2.0 * given[-1] - given[-2]]])
+    t = np.linspace(0.0, 1.0, steps, endpoint=False)[:, None]
+    spans = []
+    for a, b, c, d in zip(padded, padded[1:], padded[2:], padded[3:], strict=False):
+        spans.append(
+            0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t**2 + (3.0 * (b - c) + d - a) * t**3)
+        )
+    return [(float(x), float(y)) for x, y in np.concatenate([*spans, given[-1:]])]
+
+
 # Scene
 
 
@@ -345,8 +374,8 @@ def _link(name: str, data: bpy.types.ID, at: Point) -> bpy.types.Object:
     return obj
 
 
-def _aim(obj: bpy.types.Object, target: Point) -> bpy.types.Object:
-    """Turn a camera or lamp so that its -Z points at the target and its Y stays up."""
+def aim(obj: bpy.types.Object, target: Point) -> bpy.types.Object:
+    """Turn a camera, a lamp or its housing so that its -Z points at the target and its Y stays up."""
     obj.rotation_euler = (Vector(target) - obj.location).to_track_quat("-Z", "Y").to_euler()
     return obj
 
@@ -356,7 +385,7 @@ def add_camera(at: Point, target: Point, focal_length: float, sensor_width: floa
     camera = bpy.data.cameras.new("Camera")
     camera.lens = focal_length
     camera.sensor_width = sensor_width
-    obj = _aim(_link("Camera", camera, at), target)
+    obj = aim(_link("Camera", camera, at), target)
     bpy.context.scene.camera = obj
     return obj
 
@@ -418,7 +447,7 @@ def spot_lamp(
     lamp.spot_size = radians(angle)
     lamp.spot_blend = blend
     lamp.shadow_soft_size = radius
-    return _aim(_link(name, lamp, at), target)
+    return aim(_link(name, lamp, at), target)
 
 
 def sun_lamp(
@@ -427,7 +456,7 @@ def sun_lamp(
     """irradiance: W/m^2 on a plane that faces the sun; only the direction from `at` to `target` matters."""
     lamp = _lamp(name, "SUN", irradiance, colour)
     lamp.angle = radians(angle)
-    return _aim(_link(name, lamp, at), target)
+    return aim(_link(name, lamp, at), target)
 
 
 def area_lamp(name: str, power: float, colour: Colour, at: Point, size: tuple[float, float]) -> bpy.types.Object:
