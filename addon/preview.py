@@ -50,6 +50,7 @@ def render_preview(
     for item in objects:
         if attribute not in item.data.color_attributes:
             raise SceneError(f"Object '{item.name}' has no colour attribute '{attribute}': bake it first.")
+    bpy.context.view_layer.update()  # objects that were added just now have no place in the world before it
     if exposure is None:
         exposure = scene.view_settings.exposure or auto_exposure(objects, attribute)
     with ExitStack() as stack:
