@@ -1,4 +1,4 @@
-"""What the command line can do: bake a file, or say what baking it would take."""
+"""What the command line can do: bake a file."""
 
 from __future__ import annotations
 
@@ -15,15 +15,14 @@ from typing import NoReturn
 
 import bpy
 
-from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import Report
 from ..core.scene import SceneError
 from ..core.settings import LAYERS, Settings
-from . import panels
+from . import wording
 from .bake_scene import bake_objects
 from .preview import render_preview
-from .scene_reader import pick_receivers, read_scene
+from .scene_reader import pick_receivers
 
 SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
 
@@ -63,7 +62,7 @@ class PrintedProgress(Progress):
         step = (stage, int(10 * fraction))
         if step != self._printed:
             self._printed = step
-            quality = "" if self.error is None else f", estimated error {panels.percent(self.error)}"
+            quality = "" if self.error is None else f", estimated error {wording.percent(self.error)}"
             print(f"{fraction:4.0%}  {stage}{quality}", flush=True)
 
 
@@ -96,27 +95,12 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
     _say_what_was_done(result.report, quiet=options.quiet)
 
 
-def _plan(options: argparse.Namespace, progress: Progress) -> None:
-    """Say which effects a bake would simulate and why, and what it would cost."""
-    _open(options.input)
-    receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
-    settings = _settings(options)
-    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
-    progress.check()
-    outlook = plan(scene, settings)
-    for effect in outlook.effects:
-        print(f"{'on ' if effect.active else 'off'}  {effect.name}: {effect.reason}")
-    for warning in scene.warnings:
-        print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
-    print(f"About {outlook.seconds:.1f} s and {outlook.memory_mb:,.0f} MB.")
-
-
 def _say_what_was_done(report: Report, *, quiet: bool) -> None:
     facts = report.as_dict()
     for warning in report.warnings:
         print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
     if not quiet:
-        print(". ".join([f"Baked {panels.what_was_baked(facts)}", *panels.error_lines(facts)]) + ".")
+        print(". ".join([f"Baked {wording.what_was_baked(facts)}", *wording.error_lines(facts)]) + ".")
 
 
 def _settings(options: argparse.Namespace) -> Settings:
@@ -220,10 +204,6 @@ def _parser() -> argparse.ArgumentParser:
     bake.add_argument("--attribute", default="Radiosity", help="name of the colour attribute (Radiosity)")
     bake.add_argument("--report", type=_file(""), metavar="FILE.json", help="write what was done and how well")
     bake.add_argument("--preview", type=_file(".png"), metavar="FILE.png", help="render a picture of the baked objects")
-
-    outlook = commands.add_parser("plan", help="what a bake would simulate and cost", description=_plan.__doc__)
-    _add_scene_arguments(outlook)
-    outlook.set_defaults(command=_plan)
     return parser
 
 
