@@ -87,4 +87,3 @@ class BakeJob:
         if fraction < 0.05:
             return None
         return self.elapsed * (1.0 - fraction) / fraction
-

@@ -5,6 +5,7 @@ the bake to a worker thread and looks in ten times a second; all that the bake w
 ticks, so a cancelled bake has touched nothing, and one undo step takes a finished one back.
 """
 
+import time
 import traceback
 from collections.abc import Callable
 from typing import ClassVar
@@ -15,7 +16,7 @@ from bpy.app.handlers import persistent
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import attribute_writer, bake_scene, panels, scene_reader, viewport
+from . import attribute_writer, bake_scene, panels, scene_reader, viewport, wording
 from .job import BakeJob
 
 TICK_SECONDS = 0.1
@@ -44,6 +45,8 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         return self._attempt(lambda: self._bake_at_once(context))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
+        if bpy.app.background:  # No window, so no ticks.
+            return self.execute(context)
         return self._attempt(lambda: self._start(context))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -68,7 +71,7 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
     def _bake_at_once(self, context: bpy.types.Context) -> None:
         asked = context.scene.radiosity_baker
         receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
-        result, written = bake_scene.bake_objects(
+        result, _ = bake_scene.bake_objects(
             context,
             receivers,
             asked.to_core(),
@@ -76,17 +79,22 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
             attribute=asked.attribute,
             progress=Progress(),
         )
-        self._conclude(context, result, written)
+        self._conclude(context, result)
 
     def _start(self, context: bpy.types.Context) -> set[str]:
         asked = context.scene.radiosity_baker
         settings = asked.to_core()
+        # What was asked at the start counts, whatever is changed in the panel meanwhile.
+        self._result_mode, self._attribute, self._scene_name = asked.result_mode(), asked.attribute, context.scene.name
         receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
+        attribute_writer.check_writable(
+            receivers, settings.layers, result_mode=self._result_mode, attribute=self._attribute
+        )
+        begun = time.perf_counter()
         scene, self._sources = scene_reader.read_scene(
             context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate
         )
-        # What was asked at the start counts, whatever is changed in the panel meanwhile.
-        self._result_mode, self._attribute, self._scene_name = asked.result_mode(), asked.attribute, context.scene.name
+        self._read_seconds = time.perf_counter() - begun
         self._job = BakeJob()
         self._job.start(scene, settings)
         _start_ticking(context)
@@ -106,14 +114,14 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
                 f"The scene '{self._scene_name}' was left during the bake, so its light was not written: "
                 "stay in the scene until the bake is done."
             )
-        written = attribute_writer.write(
-            context, result, self._sources, result_mode=self._result_mode, attribute=self._attribute
-        )
-        self._conclude(context, result, written)
+        begun = time.perf_counter()
+        attribute_writer.write(context, result, self._sources, result_mode=self._result_mode, attribute=self._attribute)
+        seconds = result.report.seconds
+        seconds.update(read=self._read_seconds, write=time.perf_counter() - begun)
+        seconds["total"] += seconds["read"] + seconds["write"]
+        self._conclude(context, result)
 
-    def _conclude(
-        self, context: bpy.types.Context, result: BakeResult, written: list[bpy.types.Object]
-    ) -> None:
+    def _conclude(self, context: bpy.types.Context, result: BakeResult) -> None:
         asked = context.scene.radiosity_baker
         asked.remember(result.report.as_dict())
         view = viewport.find_view(context)
@@ -121,7 +129,7 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
             viewport.show(view)
         for warning in result.report.warnings:
             self.report({"WARNING"}, warning)
-        self.report({"INFO"}, panels.summary(result.report.as_dict()))
+        self.report({"INFO"}, wording.summary(result.report.as_dict()))
 
     def _attempt(self, action: Callable[[], set[str] | None]) -> set[str]:
         """Do it; whatever goes wrong reaches the person, and what is not their doing reaches the console too."""

@@ -5,12 +5,13 @@ wants one class for every panel of every editor.
 """
 
 import textwrap
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import bpy
 
 from . import viewport
 from .job import BakeJob
+from .wording import clock, count, energy_line, error_causes, percent
 
 #: Where the panel appears, and what Blender wants to know about each place.
 PLACES = {
@@ -18,7 +19,9 @@ PLACES = {
     "VIEW3D": {"bl_space_type": "VIEW_3D", "bl_region_type": "UI", "bl_category": "Radiosity"},
 }
 
-PIXELS_PER_LETTER = 7.5
+#: Of the default interface font at scale 1, on average; and what a panel leaves free at its sides, with an icon.
+PIXELS_PER_LETTER = 6.0
+MARGIN = 70.0
 
 
 class BakeSection:
@@ -58,9 +61,10 @@ class LastBakeSection:
     def draw(self, context: bpy.types.Context) -> None:
         settings, layout = context.scene.radiosity_baker, self.layout
         report = settings.last_report()
-        row = layout.row(align=True)
-        row.operator("view3d.radiosity_show", icon="HIDE_OFF", depress=viewport.is_shown(context))
-        row.operator("view3d.radiosity_restore", icon="LOOP_BACK", text="Restore")
+        if viewport.is_shown(context):
+            layout.operator("view3d.radiosity_restore", icon="LOOP_BACK")
+        else:
+            layout.operator("view3d.radiosity_show", icon="HIDE_OFF")
         layers = viewport.baked_layers(context.scene, report)
         if len(layers) > 1:
             grid = layout.grid_flow(columns=3, even_columns=True, align=True)
@@ -68,8 +72,15 @@ class LastBakeSection:
                 grid.prop_enum(settings, "layer", layer)
 
         column = layout.column(align=True)
-        for text in (what_was_baked(report), *error_lines(report), *energy_lines(report)):
-            _label(column, context, text)
+        _figure(column, "Baked", count("object", len(report["objects"])))
+        _figure(column, "Triangles", f"{sum(entry['triangles'] for entry in report['objects']):,}")
+        _figure(column, "Time", f"{report['seconds']['total']:.1f} s")
+        if "total" in report["estimated_error"]:
+            column = layout.column(align=True)
+            _figure(column, "Estimated Error", percent(report["estimated_error"]["total"]))
+            for cause, share in error_causes(report):
+                _figure(column, cause.capitalize(), percent(share), active=False)
+        _label(layout.column(align=True), context, energy_line(report))
         for warning in report["warnings"]:
             _label(layout.column(align=True), context, warning, icon="ERROR")
 
@@ -108,51 +119,6 @@ class AdvancedSection:
         layout.column().prop(settings, "layers", expand=True)
 
 
-def summary(report: dict[str, Any]) -> str:
-    """What a bake did and how good it is, in one line."""
-    error = report["estimated_error"].get("total")
-    quality = "" if error is None else f", estimated error {percent(error)}"
-    return f"Baked {what_was_baked(report)}{quality}"
-
-
-def what_was_baked(report: dict[str, Any]) -> str:
-    objects = report["objects"]
-    triangles = sum(entry["triangles"] for entry in objects)
-    return f"{_objects('object', len(objects))}, {triangles:,} triangles in {report['seconds']['total']:.1f} s"
-
-
-def error_lines(report: dict[str, Any]) -> list[str]:
-    """The stated error, and the three causes it comes from."""
-    error = report["estimated_error"]
-    if "total" not in error:
-        return []
-    parts = [f"{cause} {percent(error[cause])}" for cause in ("sampling", "transport", "resolution") if cause in error]
-    return [f"Estimated error {percent(error['total'])}: {', '.join(parts)}"]
-
-
-def energy_lines(report: dict[str, Any]) -> list[str]:
-    """The energy ledger in words."""
-    energy = report["energy"]
-    if not energy.get("emitted"):
-        return []
-    emitted, absorbed, escaped, residual = (
-        watts(energy[name]) for name in ("emitted", "absorbed", "escaped", "residual")
-    )
-    return [f"Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {residual} are not accounted for"]
-
-
-def percent(share: float) -> str:
-    return f"{100.0 * share:.1f} %"
-
-
-def watts(power: float) -> str:
-    return f"{power:.3g} W"
-
-
-def clock(seconds: float) -> str:
-    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
-
-
 def redraw(context: bpy.types.Context) -> None:
     """Draw the panel and the status bar anew, and nothing that costs more."""
     for window in context.window_manager.windows:
@@ -167,11 +133,7 @@ def _what_is_baked(context: bpy.types.Context) -> str:
     selected = sum(candidate.type == "MESH" for candidate in context.selected_objects)
     if selected == 0:
         return "Bakes all mesh objects"
-    return f"Bakes {_objects('selected object', selected)}"
-
-
-def _objects(noun: str, count: int) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    return f"Bakes {count('selected object', selected)}"
 
 
 def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:
@@ -188,8 +150,10 @@ def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
     job, layout = BakeJob.running, header.layout
     if job is None:
         return
-    layout.label(icon="EVENT_ESC")
-    layout.label(text="Cancel Bake")
+    key = layout.row(align=True)
+    key.label(icon="EVENT_ESC")
+    key.separator(factor=2.0)
+    key.label(text="Cancel Bake")
     layout.separator_spacer()
     bar = layout.row()
     bar.ui_units_x = 16
@@ -214,10 +178,20 @@ def _figures(job: BakeJob) -> list[str]:
     return [time, "No estimate of the error yet" if error is None else f"Estimated error {percent(error)}"]
 
 
+def _figure(layout: bpy.types.UILayout, name: str, value: str, *, active: bool = True) -> None:
+    """A name and its value, aligned as Blender aligns a property."""
+    split = layout.split(factor=0.5)
+    split.active = active
+    right = split.row()
+    right.alignment = "RIGHT"
+    right.label(text=name)
+    split.label(text=value)
+
+
 def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A text over as many lines as the region's width calls for; Blender's own labels cut it off."""
-    width = context.region.width / context.preferences.system.ui_scale
-    for line in textwrap.wrap(text, max(20, int(width / PIXELS_PER_LETTER) - 6)):
+    width = context.region.width / context.preferences.system.ui_scale - MARGIN
+    for line in textwrap.wrap(text, max(20, int(width / PIXELS_PER_LETTER))):
         layout.label(text=line, icon=icon)
         icon = "NONE" if icon == "NONE" else "BLANK1"
 
@@ -232,8 +206,6 @@ def _panels() -> list[type]:
             about = dict(where, bl_idname=name)
             if section is not BakeSection:
                 about["bl_parent_id"] = main
-            elif place == "RENDER":
-                about["bl_options"] = {"DEFAULT_CLOSED"}
             made.append(type(name, (section, bpy.types.Panel), about))
     return made
 

@@ -5,6 +5,7 @@ the events that were simulated. The process ends with 0 when every step showed w
 """
 
 import os
+import shutil
 import subprocess
 import threading
 import time
@@ -18,6 +19,7 @@ DESK = Path(os.environ["DESK"])
 PICTURES = DESK / "pictures"
 MODULE = "bl_ext.user_default.radiosity_baker"
 THREAD = "radiosity bake"
+IMPORT, IDENTIFY = shutil.which("import"), shutil.which("identify")  # of ImageMagick
 LETTERS = {" ": "SPACE"}
 
 times = {}
@@ -32,6 +34,12 @@ def sidebar():
     return next(region for region in view_area().regions if region.type == "UI")
 
 
+def middle():
+    """A place in the 3D View with nothing to click on."""
+    area = view_area()
+    return area.x + area.width // 3, area.y + area.height // 3
+
+
 def event(kind, value, x, y, **more):
     bpy.context.window.event_simulate(type=kind, value=value, x=int(x), y=int(y), **more)
 
@@ -43,17 +51,15 @@ def click(x, y):
     yield 0.1
     event("LEFTMOUSE", "RELEASE", x, y)
     yield 0.1
+    event("MOUSEMOVE", "NOTHING", *middle())
 
 
 def press(kind, **modifiers):
     """A key, with the mouse over the middle of the 3D View."""
-    area = view_area()
-    x, y = area.x + area.width // 3, area.y + area.height // 2
-    event("MOUSEMOVE", "NOTHING", x, y)
+    event("MOUSEMOVE", "NOTHING", *middle())
     yield 0.1
-    event(kind, "PRESS", x, y, **modifiers)
-    event(kind, "RELEASE", x, y, **modifiers)
-    yield 0.1
+    event(kind, "PRESS", *middle(), **modifiers)
+    event(kind, "RELEASE", *middle(), **modifiers)
 
 
 def write(text):
@@ -65,9 +71,9 @@ def write(text):
 
 def picture(name):
     path = PICTURES / f"{name}.png"
-    subprocess.run(["import", "-window", "root", str(path)], check=True)
+    subprocess.run([IMPORT, "-window", "root", str(path)], check=True)
     spread = subprocess.run(
-        ["identify", "-format", "%[fx:standard_deviation]", str(path)], check=True, capture_output=True, text=True
+        [IDENTIFY, "-format", "%[fx:standard_deviation]", str(path)], check=True, capture_output=True, text=True
     )
     assert float(spread.stdout) > 0.02, f"the picture {name} is blank"
     print("picture:", name, flush=True)
@@ -142,10 +148,19 @@ def time_ticks():
     operator.modal = timed
 
 
-def day():
+def bake_by_click():
+    yield from click(*bake_button())
+    yield from until(baking, 5, "the start of a bake by a click")
+
+
+def open_sample():
+    bpy.ops.wm.open_mainfile(filepath=str(DESK / "sample.blend"), load_ui=False)
+
+
+def see_the_panel():
     bpy.context.preferences.view.show_splash = False
     yield 0.5
-    bpy.ops.wm.open_mainfile(filepath=str(DESK / "sample.blend"), load_ui=False)
+    open_sample()
     yield 1.0
     yield from open_tab()
     bpy.ops.object.select_all(action="DESELECT")
@@ -153,17 +168,15 @@ def day():
         bpy.ops.view3d.view_camera()
     yield 0.5
     picture("panel")
-    before = content()
-    look = view_area().spaces.active.shading.type
-    time_ticks()
 
-    # Esc, early.
+
+def cancel_with_escape():
+    before = content()
     settings().triangles = 200_000
-    yield from click(*bake_button())
-    yield from until(baking, 5, "the start of a bake by a click")
+    yield from bake_by_click()
     yield 1.0
     picture("baking")
-    start = time.perf_counter()
+    start = time.perf_counter() + 0.1  # The key goes down that long after the mouse has moved.
     yield from press("ESC")
     yield from until(lambda: not running(), 5, "the end of the bake after Esc")
     times["from Esc to the end of the bake, ms"] = 1000.0 * (time.perf_counter() - start)
@@ -171,24 +184,28 @@ def day():
     picture("cancelled")
     assert content() == before, "a cancelled bake changed the file"
 
-    # The button, later, and an undo in the middle, which must do no harm.
-    yield from click(*bake_button())
-    yield from until(baking, 5, "the start of the second bake")
+
+def cancel_with_the_button():
+    """And undo something while it bakes, which must do no harm."""
+    before = content()
+    yield from bake_by_click()
+    yield 0.3
     yield from press("Z", ctrl=True)
     yield 0.5
     yield from click(*cancel_button())
     yield from until(lambda: not running(), 5, "the end of the bake after Cancel")
     assert content() == before, "a cancelled bake changed the file"
 
-    # To the end.
+
+def bake_undo_redo():
+    before = content()
     settings().triangles = 20_000
     settings().layers = {"combined", "direct", "indirect"}
     yield 0.3
     bpy.ops.ed.undo_push(message="Settings")
-    yield from click(*bake_button())
-    yield from until(baking, 5, "the start of the third bake")
-    yield from until(lambda: not running(), 120, "the end of the third bake")
-    yield 1.0
+    yield from bake_by_click()
+    yield from until(lambda: not running(), 120, "the end of the bake")
+    yield 2.0
     picture("baked")
     after = content()
     assert after != before, "the bake wrote nothing"
@@ -200,9 +217,11 @@ def day():
     assert content() == before, f"one undo step did not take the bake back: {content()}"
     yield from press("Z", ctrl=True, shift=True)
     yield 1.0
-    assert content() == after, "redo did not bring the bake back"
     picture("redone")
+    assert content() == after, "redo did not bring the bake back"
 
+
+def switch_layers():
     settings().layer = "indirect"
     yield 0.5
     picture("layer")
@@ -210,38 +229,47 @@ def day():
     bpy.ops.view3d.radiosity_restore()
     yield 0.5
     picture("restored")
-    assert view_area().spaces.active.shading.type == look
+    assert view_area().spaces.active.shading.color_type == "MATERIAL"
 
-    # F3 finds it.
+
+def search_for_it():
     yield from press("F3")
     yield 0.5
     yield from write("bake radiosity")
     yield 0.5
     picture("search")
     yield from press("ESC")
+    yield 0.2
     yield from press("ESC")
+    yield 0.2
 
-    # The Render properties show the same panel.
+
+def see_the_render_properties():
     editor = next(area for area in bpy.context.window.screen.areas if area.type == "PROPERTIES")
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"  # It has the fewest panels of its own above ours.
     editor.spaces.active.context = "RENDER"
-    yield 0.5
+    for _ in range(40):
+        event("WHEELDOWNMOUSE", "PRESS", editor.x + editor.width // 2, editor.y + editor.height // 2)
+        yield 0.02
+    yield 1.0
     picture("properties")
 
-    # Another file during a bake.
+
+def load_a_file_meanwhile():
     settings().triangles = 200_000
-    yield from click(*bake_button())
-    yield from until(baking, 5, "the start of the fourth bake")
-    bpy.ops.wm.open_mainfile(filepath=str(DESK / "sample.blend"), load_ui=False)
+    yield from bake_by_click()
+    open_sample()
     assert not baking(), "loading a file left the bake running"
     yield 1.0
-    assert content() == before
-
-    # Edit Mode at the end of a bake: the result waits.
+    assert not running()
     yield from open_tab()
+
+
+def edit_meanwhile():
+    """A bake that ends in Edit Mode waits for Object Mode before it writes."""
+    before = content()
     settings().triangles = 1_000
-    yield 0.5
-    yield from click(*bake_button())
-    yield from until(baking, 5, "the start of the fifth bake")
+    yield from bake_by_click()
     bpy.context.view_layer.objects.active = next(o for o in bpy.context.scene.objects if o.type == "MESH")
     bpy.ops.object.mode_set(mode="EDIT")
     yield from until(lambda: not baking(), 60, "the end of the thread")
@@ -252,19 +280,47 @@ def day():
     yield from until(lambda: not running(), 5, "writing after Edit Mode")
     assert content() != before
 
-    # The add-on goes away during a bake, and comes back; twice.
-    for _ in range(2):
-        settings().triangles = 200_000
-        yield 0.3
-        yield from click(*bake_button())
-        yield from until(baking, 5, "the start of a bake")
-        addon_utils.disable(MODULE)
-        assert not baking(), "disabling the add-on left the bake running"
-        assert not hasattr(bpy.types.Scene, "radiosity_baker")
-        yield 0.5
-        picture("disabled")
-        addon_utils.enable(MODULE)
-        yield from open_tab()
+
+def delete_meanwhile():
+    before = content()
+    settings().triangles = 1_000
+    yield from bake_by_click()
+    doomed = next(o for o in bpy.context.scene.objects if o.type == "MESH" and not o.hide_render)
+    bpy.data.objects.remove(doomed)
+    yield from until(lambda: not running(), 60, "the end of the bake")
+    yield 0.5
+    picture("deleted")
+    assert len(content()) == len(before) - 1, "a bake of a deleted object wrote something"
+    yield from press("ESC")
+    yield 0.2
+
+
+def disable_meanwhile():
+    settings().triangles = 200_000
+    yield from bake_by_click()
+    addon_utils.disable(MODULE)
+    assert not baking(), "disabling the add-on left the bake running"
+    assert not hasattr(bpy.types.Scene, "radiosity_baker")
+    yield 0.5
+    picture("disabled")
+    addon_utils.enable(MODULE)
+    yield from open_tab()
+
+
+def day():
+    yield from see_the_panel()
+    time_ticks()
+    yield from cancel_with_escape()
+    yield from cancel_with_the_button()
+    yield from bake_undo_redo()
+    yield from switch_layers()
+    yield from search_for_it()
+    yield from see_the_render_properties()
+    yield from load_a_file_meanwhile()
+    yield from edit_meanwhile()
+    yield from delete_meanwhile()
+    yield from disable_meanwhile()
+    yield from disable_meanwhile()
 
 
 def drive(steps):
@@ -277,7 +333,7 @@ def drive(steps):
         os._exit(0)
     except BaseException:  # noqa: BLE001 - whatever it was, the window must not stay open
         traceback.print_exc()
-        subprocess.run(["import", "-window", "root", str(PICTURES / "failure.png")], check=False)
+        subprocess.run([IMPORT, "-window", "root", str(PICTURES / "failure.png")], check=False)
         os._exit(1)
 
 
