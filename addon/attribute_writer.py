@@ -12,7 +12,7 @@ import numpy as np
 from ..core.result import BakedObject, BakeResult
 from ..core.scene import Float32, SceneError
 from .render_visibility import shown_as_rendered
-from .scene_reader import ORIGINAL_KEY, ReceiverSource, check_same_corners
+from .scene_reader import ORIGINAL_KEY, ReceiverSource, check_same_corners, evaluated_mesh
 from .tessellated_mesh import build_mesh
 
 ResultMode = Literal["new", "replace", "keep"]
@@ -66,6 +66,7 @@ def write(
     its original is baked again, and baking the copy itself renews its light.
     Raises SceneError before anything is changed.
     """
+    context.view_layer.update()  # Until then a removed object leaves a hole in its list.
     objects = [_find(context.view_layer, source) for source in sources]
     baked = {item.name: item for item in result.objects}
     layers = list(result.objects[0].layers) if result.objects else []
@@ -115,14 +116,14 @@ def _tessellated(
     receiver: _Receiver, depsgraph: bpy.types.Depsgraph, *, result_mode: ResultMode, attribute: str
 ) -> bpy.types.Mesh:
     obj, source, baked = receiver.object, receiver.source, receiver.baked
-    evaluated = obj.evaluated_get(depsgraph)
-    if result_mode == "replace":
-        # The modifiers stay, and would act twice on an evaluated mesh.
-        check_same_corners(obj, evaluated.data)
-        evaluated = obj
-    _check_unchanged(obj, evaluated.data, source)
     names = {attribute_name(attribute, layer) for layer in baked.layers}
-    mesh = build_mesh(evaluated, source, baked, leave_out=names)
+    with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
+        if result_mode == "replace":
+            check_same_corners(obj, evaluated)
+        # The modifiers of a replaced mesh stay, and would act twice on what they have made already.
+        shape = obj.data if result_mode == "replace" else evaluated
+        _check_unchanged(obj, shape, source)
+        mesh = build_mesh(shape, obj.vertex_groups, source, baked, leave_out=names)
     turn = [0, 2, 1] if source.flipped else [0, 1, 2]
     _paint(mesh, {name: values[:, turn].reshape(-1, 3) for name, values in baked.layers.items()}, attribute)
     return mesh

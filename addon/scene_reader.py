@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -74,8 +75,6 @@ def read_scene(
     rendered = rendered_objects(view_layer)
     for obj in receivers:
         _check_rendered(obj, rendered)
-        if obj.mode == "EDIT":
-            obj.update_from_editmode()
     reading = _Reading(set(receivers), rendered - _covered(rendered, receivers))
     with shown_as_rendered(view_layer):
         depsgraph.update()
@@ -83,7 +82,8 @@ def read_scene(
             reading.add(instance)
         if not tessellate:
             for obj in receivers:
-                check_same_corners(obj, obj.evaluated_get(depsgraph).data)
+                with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
+                    check_same_corners(obj, mesh)
     sky, warnings = read_world(depsgraph.scene_eval.world)
     scene = Scene(
         objects=tuple(reading.objects),
@@ -95,6 +95,18 @@ def read_scene(
     _check_receivers(receivers, reading.sources)
     _check_light(scene, depsgraph.scene.name)
     return scene, reading.sources
+
+
+@contextmanager
+def evaluated_mesh(obj: bpy.types.Object) -> Iterator[bpy.types.Mesh]:
+    """The mesh of an evaluated object; in Edit Mode the one being edited, which Blender lends for a moment only."""
+    if obj.mode != "EDIT":
+        yield obj.data
+        return
+    try:
+        yield obj.to_mesh()
+    finally:
+        obj.to_mesh_clear()
 
 
 def check_same_corners(obj: bpy.types.Object, evaluated: bpy.types.Mesh) -> None:
@@ -145,7 +157,7 @@ class _Reading:
             self.warnings.append(
                 f"Object '{name}' is visible to some rays only (Ray Visibility): all see it in the bake."
             )
-        mesh = self._mesh(obj.data)
+        mesh = self._mesh(obj)
         if not len(mesh.corners):
             return
         if not np.isfinite(mesh.vertices).all() or not np.isfinite(matrix).all():
@@ -173,15 +185,16 @@ class _Reading:
                     mesh.corners[:, turn],
                     mesh.polygons,
                     flipped,
-                    corner_count=len(obj.data.loops),
+                    corner_count=mesh.corner_count,
                     vertex_count=len(mesh.vertices),
                 )
             )
 
-    def _mesh(self, mesh: bpy.types.Mesh) -> _LocalMesh:
-        key = mesh.as_pointer()
+    def _mesh(self, obj: bpy.types.Object) -> _LocalMesh:
+        key = obj.data.as_pointer()
         if key not in self._meshes:
-            self._meshes[key] = _LocalMesh.read(mesh)
+            with evaluated_mesh(obj) as mesh:
+                self._meshes[key] = _LocalMesh.read(mesh)
         return self._meshes[key]
 
 
@@ -199,6 +212,7 @@ class _LocalMesh:
     polygons: Int32
     material_index: Int32
     corner_normals: Float32 | None
+    corner_count: int
 
     @staticmethod
     def read(mesh: bpy.types.Mesh) -> _LocalMesh:
@@ -215,6 +229,7 @@ class _LocalMesh:
             polygons=polygons,
             material_index=_integers(mesh.polygons, "material_index")[polygons],
             corner_normals=normals,
+            corner_count=len(mesh.loops),
         )
 
 

@@ -5,7 +5,7 @@ The shape is exactly the original's: old vertices keep their coordinates bit by 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -39,30 +39,36 @@ Values = NDArray[Any]
 
 
 def build_mesh(
-    original: bpy.types.Object, source: ReceiverSource, baked: BakedObject, *, leave_out: Collection[str]
+    original: bpy.types.Mesh,
+    groups: Sequence[bpy.types.VertexGroup],
+    source: ReceiverSource,
+    baked: BakedObject,
+    *,
+    leave_out: Collection[str],
 ) -> bpy.types.Mesh:
     """A new mesh datablock of `baked`'s triangles, in the object's space.
 
-    original: the object whose mesh has `source`'s corners, evaluated or not. leave_out: attributes not to copy. Faces
-    are in the order of baked.triangles; their corners too, with the last two swapped where source.flipped.
+    original: the mesh that has `source`'s corners, evaluated or not. groups: its object's vertex groups. leave_out:
+    attributes not to copy. Faces are in the order of baked.triangles; their corners too, with the last two swapped
+    where source.flipped.
     """
-    split = _Split.of(original.data, source, baked)
-    mesh = bpy.data.meshes.new(original.data.name)
+    split = _Split.of(original, source, baked)
+    mesh = bpy.data.meshes.new(original.name)
     mesh.vertices.add(len(baked.vertices))
-    mesh.vertices.foreach_set("co", split.coordinates(original.data).astype(np.float32).ravel())
+    mesh.vertices.foreach_set("co", split.coordinates(original).astype(np.float32).ravel())
     mesh.loops.add(split.triangles.size)
     mesh.loops.foreach_set("vertex_index", split.triangles.ravel())
     mesh.polygons.add(len(split.triangles))
     mesh.polygons.foreach_set("loop_start", np.arange(0, split.triangles.size, 3, dtype=np.int32))
     mesh.update(calc_edges=True)
-    for material in original.data.materials:
+    for material in original.materials:
         mesh.materials.append(material and material.original)
-    edges = split.edges(original.data, mesh)
-    _copy_attributes(original.data, mesh, split, edges, leave_out)
-    _copy_seams(original.data, mesh, edges)
-    _copy_normals(original.data, mesh, split)
-    _copy_weights(original, mesh, split)
-    _copy_choices(original.data, mesh)
+    edges = split.edges(original, mesh)
+    _copy_attributes(original, mesh, split, edges, leave_out)
+    _copy_seams(original, mesh, edges)
+    _copy_normals(original, mesh, split)
+    _copy_weights(original, mesh, groups, split)
+    _copy_choices(original, mesh)
     return mesh
 
 
@@ -186,17 +192,18 @@ def _copy_normals(old: bpy.types.Mesh, new: bpy.types.Mesh, split: _Split) -> No
     new.normals_split_custom_set(np.divide(normals, length, out=normals, where=length > 0.0).astype(np.float32))
 
 
-def _copy_weights(original: bpy.types.Object, mesh: bpy.types.Mesh, split: _Split) -> None:
+def _copy_weights(
+    old: bpy.types.Mesh, new: bpy.types.Mesh, groups: Sequence[bpy.types.VertexGroup], split: _Split
+) -> None:
     """Vertex groups live in the mesh, but only an object can write them: a passing one does."""
-    groups = original.vertex_groups
     if not groups:
         return
-    old = np.zeros((len(original.data.vertices), len(groups)))
-    for index, vertex in enumerate(original.data.vertices):
+    of_old = np.zeros((len(old.vertices), len(groups)))
+    for index, vertex in enumerate(old.vertices):
         for member in vertex.groups:
-            old[index, member.group] = member.weight
-    weights = split.point(original.data, old, mix=True)
-    writer = bpy.data.objects.new(mesh.name, mesh)
+            of_old[index, member.group] = member.weight
+    weights = split.point(old, of_old, mix=True)
+    writer = bpy.data.objects.new(new.name, new)
     try:
         for group, of_group in zip(groups, weights.T, strict=True):
             target = writer.vertex_groups.new(name=group.name)

@@ -121,6 +121,11 @@ def read_colours(mesh, name):
 
 
 @pytest.fixture
+def cycles_bake():
+    return bake_with_cycles
+
+
+@pytest.fixture
 def colours():
     return read_colours
 

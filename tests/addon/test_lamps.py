@@ -180,7 +180,7 @@ NEWER = pytest.mark.skipif(
     ],
 )
 def test_newer_lamp_settings_mean_what_cycles_means(add_lamp, cycles_irradiance, kind, settings):
-    obj = add_lamp(kind, {"energy": 100.0, **settings}, location=ABOVE, scale=(2.0, 1.0, 1.0))
+    obj = add_lamp(kind, {"energy": 100.0, **settings}, location=ABOVE, scale=(2.0, 1.0, 1.0), rotation_euler=(0, 0, 1))
     expected = cycles_irradiance(POINTS, UP, samples=512)
 
     np.testing.assert_allclose(irradiance(read(obj)), expected, atol=SAMPLED * expected.max())

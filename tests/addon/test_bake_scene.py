@@ -1,0 +1,48 @@
+"""Read, bake and write in one call."""
+
+import bpy
+import pytest
+
+from radiosity_baker.addon import bake_scene
+from radiosity_baker.core.progress import Progress
+from radiosity_baker.core.scene import SceneError
+from radiosity_baker.core.settings import Settings
+
+
+@pytest.fixture
+def lit_plane(add_mesh, add_lamp):
+    add_lamp("POINT", {"energy": 100.0}, location=(0.5, 0.5, 1.0))
+    return add_mesh("Plane")
+
+
+def run(obj, mode="new", **settings):
+    return bake_scene.bake_objects(
+        bpy.context,
+        [obj],
+        Settings(tessellate=mode != "keep", triangles=64, error=None, **settings),
+        result_mode=mode,
+        attribute="Radiosity",
+        progress=Progress(),
+    )
+
+
+@pytest.mark.parametrize("mode", ["keep", "replace", "new"])
+def test_a_lit_plane_is_baked_and_written(lit_plane, colours, mode):
+    result, (written,) = run(lit_plane, mode)
+
+    light = colours(written.data, "Radiosity")
+    # At most what straight down from the lamp gives: albedo / pi x 100 / (4 pi) / 1^2; a fit may overshoot a little.
+    assert 0.0 < light.min() < light.max() < 1.1 * 0.8 * 100.0 / (4.0 * 3.14159**2)
+    seconds = result.report.seconds
+    assert seconds["read"] > 0.0
+    assert seconds["write"] > 0.0
+    assert seconds["total"] >= seconds["read"] + seconds["write"]
+    assert result.report.objects[0]["name"] == written.name
+
+
+def test_what_cannot_be_written_is_refused_before_the_bake(lit_plane, monkeypatch):
+    lit_plane.data.attributes.new("Radiosity", "FLOAT", "POINT")
+    monkeypatch.setattr(bake_scene, "bake", lambda *_: pytest.fail("the bake ran"))
+
+    with pytest.raises(SceneError, match="did not make"):
+        run(lit_plane)
