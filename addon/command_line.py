@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import io
 import json
 import os
 import shutil
 import signal
 import sys
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, redirect_stdout
 from pathlib import Path
 from typing import NoReturn
 
@@ -25,6 +27,8 @@ from .preview import render_preview
 from .scene_reader import pick_receivers
 
 SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
+
+MANIFEST = Path(__file__).resolve().parent.parent / "blender_manifest.toml"
 
 
 class FileError(Exception):
@@ -80,6 +84,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
         attribute=options.attribute,
         progress=progress,
     )
+    result.report.version = _version()
     with ExitStack() as unfinished:
         # Entered first, moved into place last: whoever sees the .blend finds the report and the preview beside it.
         blend = unfinished.enter_context(_moved_into_place(options.output))
@@ -133,6 +138,10 @@ def _open(path: Path | None) -> Path:
     return path
 
 
+def _version() -> str:
+    return tomllib.loads(MANIFEST.read_text(encoding="utf-8"))["version"]
+
+
 def _is_compressed(path: Path) -> bool:
     with path.open("rb") as file:
         return file.read(7) != b"BLENDER"
@@ -161,7 +170,8 @@ def _moved_into_place(path: Path) -> Iterator[Path]:
 
 def _save(path: Path, *, compress: bool) -> None:
     try:
-        bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress)
+        with redirect_stdout(io.StringIO()):  # Blender says that it saved the file, by its temporary name
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True, compress=compress)
     except RuntimeError as problem:
         raise FileError(f"The baked file cannot be saved in {path.parent}: is the disk full? ({problem})") from problem
 
@@ -195,6 +205,7 @@ class _Parser(argparse.ArgumentParser):
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="radiosity-baker", description="Bake the light of a Blender scene into colour attributes.")
+    parser.add_argument("--version", action="version", version=_version())
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     bake = commands.add_parser("bake", help="bake a .blend file into another one", description=_bake.__doc__)

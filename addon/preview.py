@@ -124,7 +124,7 @@ def _show_values(studio: bpy.types.Scene) -> None:
     studio.render.engine = "BLENDER_WORKBENCH"
     image = studio.render.image_settings
     image.file_format, image.color_mode = "PNG", "RGB"
-    studio.display.render_aa = "16"
+    studio.display.render_aa = "8"
     shading = studio.display.shading
     shading.light, shading.color_type = "FLAT", "VERTEX"
     shading.show_shadows = shading.show_cavity = shading.show_object_outline = shading.show_xray = False
