@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.form_factors.analytic import analytic_rows
-from radiosity_baker.core.form_factors.pairs import Estimate
+from radiosity_baker.core.form_factors.analytic import analytic_rows, unoccluded_exchange
+from radiosity_baker.core.form_factors.contour import exchange_area
+from radiosity_baker.core.form_factors.pairs import Estimate, Faces
+from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 from radiosity_baker.core.form_factors.rows import balance, symmetric_exchange
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import make_patches, unit_space
+from radiosity_baker.core.patches import make_patches, triangle_geometry, unit_space
 from radiosity_baker.core.progress import Progress
+from radiosity_baker.core.sampling import triangle_points
 from radiosity_baker.core.scene import Scene, SceneObject, Surface
 from radiosity_baker.core.visibility import Visibility
 
@@ -53,6 +56,45 @@ def exchanged(found: Estimate, first: int, second: int) -> float:
     """Sum of A_i F_ij from the sides of one surface to those of another."""
     red = found.sides.albedo[:, 0]
     return float((found.sides.area * found.rows.apply((red == second / 4).astype(float)))[red == first / 4].sum())
+
+
+def test_near_pairs_agree_with_lambert_over_a_fine_grid() -> None:
+    """60 random pairs, at any distance, some of which cut each other's planes or each other.
+
+    4,096 midpoints of the first triangle. Where the second touches or cuts it, the light jumps from one point to the
+    next: a strip 1/64 of the triangle wide, which holds about 0.4 / 64 of an area of 0.3 and is half right, errs 1e-3.
+    """
+    rng = np.random.default_rng(7)
+    corners = rng.uniform(-1, 1, (120, 3, 3)) / 2
+    corners[60:] += rng.uniform(-1, 1, (60, 1, 3)) * np.linspace(0, 2, 60)[:, None, None]
+    normals, area = triangle_geometry(corners)
+    centroid = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centroid[:, None], axis=2).max(axis=1)
+    faces = Faces(corners, normals, area, centroid, radius, np.arange(120))
+    first, second = np.arange(60), np.arange(60, 120)
+    steps = (np.arange(64) + 0.5) / 64
+    grid = triangle_points(np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2))
+    shed = polygon_irradiance(grid @ corners[first], normals[first, None], corners[second, None])
+    found = unoccluded_exchange(faces, first, second)
+    assert (found > 1e-4).sum() > 20
+    assert found == pytest.approx(area[first] * shed.mean(axis=1), rel=2e-3, abs=1e-3)
+    assert unoccluded_exchange(faces, second, first) == pytest.approx(found, abs=1e-12)
+
+
+def test_every_distance_has_a_rule_that_holds() -> None:
+    """Pairs face to face, from a hundredth of a radius apart to a hundred: within 5e-3 of the contour integral, three
+    times the root mean square error of the rules at their limits."""
+    rng = np.random.default_rng(11)
+    angle = rng.uniform(0, 2 * np.pi, (400, 1)) + np.array([0, 2.0, 4.2])
+    corners = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=-1)
+    corners[200:] = corners[200:, ::-1]
+    corners[200:, :, 2] += np.geomspace(0.01, 100, 200)[:, None] * (1 + 0.3 * rng.random((200, 3)))
+    normals, area = triangle_geometry(corners)
+    centroid = corners.mean(axis=1)
+    radius = np.linalg.norm(corners - centroid[:, None], axis=2).max(axis=1)
+    faces = Faces(corners, normals, area, centroid, radius, np.arange(400))
+    found = unoccluded_exchange(faces, np.arange(200), np.arange(200, 400))
+    assert found == pytest.approx(exchange_area(corners[:200], corners[200:]), rel=5e-3)
 
 
 @pytest.mark.parametrize("wanted", [12, 192])
@@ -104,7 +146,7 @@ def test_a_wall_between_leaves_nothing() -> None:
 def test_a_wall_half_way_over_half_of_it_takes_exactly_half() -> None:
     """Half way between two equal squares a way passes the wall's edge if x1 + x2 > 0, and half of them do.
 
-    About 60 x 60 pairs of at least one ray: the standard error is under 0.5 / sqrt(3600), 1.7 % of the half.
+    32 x 32 pairs of at least 4 rays: the standard error is under 0.5 / sqrt(4096), 1.6 % of the half.
     """
     ground, lid = square("ground", 1, 0, 1, up=True), square("lid", 1, 1, 2, up=False)
     corners = np.array([[0, -1, 0.5], [1, -1, 0.5], [1, 1, 0.5], [0, 1, 0.5]])
@@ -115,9 +157,9 @@ def test_a_wall_half_way_over_half_of_it_takes_exactly_half() -> None:
 
 
 def test_a_blocker_smaller_than_a_patch_takes_its_fraction() -> None:
-    """Against 400,000 random ways between the squares, of which about 4 % meet the blocker: 0.8 % standard error.
+    """Against 400,000 random ways between the squares, of which about 10 % meet the blocker: 0.5 % standard error.
 
-    32 x 32 pairs, 16 seeds and at least 4 rays a pair give the estimate 2 %; 4 standard errors of both are 9 %.
+    8 x 8 pairs of 16 rays give an estimate sqrt(0.1 0.9 / 1024), 9.5 % of the fraction, at most; 16 seeds 2.4 %.
     """
     rng = np.random.default_rng(3)
     start, end = rng.uniform(-0.5, 0.5, (2, 400_000, 2))
@@ -128,8 +170,8 @@ def test_a_blocker_smaller_than_a_patch_takes_its_fraction() -> None:
     blocker = square("blocker", 0.2, 0.5, 0, up=True)
     free = exchanged(estimate(ground, lid, wanted=16), 1, 2)
     hidden = [1 - exchanged(estimate(ground, lid, blocker, wanted=16, seed=seed), 1, 2) / free for seed in range(16)]
-    assert np.mean(hidden) == pytest.approx(expected, rel=0.09)
-    assert np.std(hidden) < 3 * expected
+    assert np.mean(hidden) == pytest.approx(expected, rel=0.1)
+    assert np.std(hidden) < 0.15 * expected
 
 
 def test_backs_take_part_where_light_reaches_them() -> None:
@@ -150,14 +192,19 @@ def test_culled_light_is_reported() -> None:
     assert found.escape.max() == 0.0
 
 
-def test_open_sky_escapes() -> None:
-    """A lidless cube: every side's light goes to the others or out through the top, as a lid would have received it."""
+@pytest.mark.parametrize("threshold", [0.0, 5e-3])
+def test_open_sky_escapes(threshold: float) -> None:
+    """A lidless cube: every side's light goes to the others or out through the top, as a lid would have received it.
+
+    Culled light does not count as escaped.
+    """
     lid = np.flatnonzero((CORNERS[INWARD][:, :, 2] == 1).all(axis=1))
-    found = estimate(mesh("cube", CORNERS, np.delete(INWARD, lid, axis=0)), wanted=100)
+    found = estimate(mesh("cube", CORNERS, np.delete(INWARD, lid, axis=0)), wanted=100, threshold=threshold)
     front = ~found.sides.back
-    assert (found.rows.row_sums() + found.escape)[front] == pytest.approx(1.0, abs=1e-6)
+    assert (found.rows.row_sums() + found.escape + found.culled)[front] == pytest.approx(1.0, abs=1e-6)
     ground = front & (found.sides.patches.normals[found.sides.patch][:, 2] > 0.5)
     assert np.average(found.escape[ground], weights=found.sides.area[ground]) == pytest.approx(0.199824896, abs=1e-3)
+    assert (found.culled.max() > 0.01) == (threshold > 0)
 
 
 def test_threads_give_the_same_bytes() -> None:
