@@ -282,9 +282,10 @@ def sheet(points: np.ndarray, thickness: float, material: bpy.types.Material) ->
 
 
 def hanging_cloth(
-    width: float, height: float, folds: int, depth: float, material: bpy.types.Material, thickness: float = 0.004
+    size: tuple[float, float], thickness: float, material: bpy.types.Material, *, folds: int, depth: float
 ) -> Shape:
-    """A gathered curtain along x, centred, from z = 0 to height: a little irregular, folded deeper towards the floor."""
+    """A gathered curtain along x, centred, standing on z = 0: a little irregular, folded deeper towards the floor."""
+    width, height = size
     u, z = np.meshgrid(np.linspace(0.0, 1.0, 8 * folds + 1), np.linspace(0.0, height, 6), indexing="ij")
     fall = 1.0 - z / height
     phase = 2.0 * np.pi * folds * u + 0.7 * np.sin(5.0 * u + 2.0 * fall)
@@ -298,11 +299,10 @@ def curve(points: Sequence[tuple[float, float]], steps: int) -> list[tuple[float
     given = np.array(points)
     padded = np.concatenate([[2.0 * given[0] - given[1]], given, [2.0 * given[-1] - given[-2]]])
     t = np.linspace(0.0, 1.0, steps, endpoint=False)[:, None]
-    spans = []
-    for a, b, c, d in zip(padded, padded[1:], padded[2:], padded[3:], strict=False):
-        spans.append(
-            0.5 * (2.0 * b + (c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t**2 + (3.0 * (b - c) + d - a) * t**3)
-        )
+    spans = [
+        b + 0.5 * ((c - a) * t + (2.0 * a - 5.0 * b + 4.0 * c - d) * t**2 + (3.0 * (b - c) + d - a) * t**3)
+        for a, b, c, d in zip(padded, padded[1:], padded[2:], padded[3:], strict=False)
+    ]
     return [(float(x), float(y)) for x, y in np.concatenate([*spans, given[-1:]])]
 
 

@@ -1,6 +1,7 @@
-"""Builds stage.blend beside this file: smooth forms on a stage, lit by eight spot lamps and one point lamp, and no sky.
+"""Builds stage.blend beside this file: smooth forms on a stage, lit by eight spot lamps and one point lamp, no sky.
 
-The stage is a cyclorama, a floor that rises into the back wall in one curve. x runs across it, the audience looks along +y.
+The stage is a cyclorama, a floor that rises into the back wall in one curve. x runs across it; the audience looks
+along +y.
 """
 
 from __future__ import annotations
@@ -37,7 +38,7 @@ Material = bpy.types.Material
 GAP = 0.0005
 STEP_HEIGHT, STEPS = 0.16, 3
 PODIUM = STEP_HEIGHT * STEPS
-TRUSS_HEIGHT, TRUSS_Y = 4.75, 2.3
+TRUSS_HEIGHT, TRUSS_Y = 4.5, 2.3
 
 PALETTE: dict[str, Colour] = {
     "Backdrop": (0.62, 0.60, 0.58),
@@ -55,14 +56,14 @@ PALETTE: dict[str, Colour] = {
 
 #: name, power in W, colour, position, target, cone angle, blend
 SPOTS: list[tuple[str, float, Colour, tuple[float, ...], tuple[float, ...], float, float]] = [
-    ("Key", 2300.0, (1.0, 0.80, 0.56), (-3.6, -5.2, 5.0), (0.0, 0.0, 1.35), 24.0, 0.5),
-    ("Amber", 1700.0, (1.0, 0.50, 0.16), (1.6, -5.4, 5.0), (-2.75, 0.25, 0.9), 19.0, 0.4),
-    ("Violet", 2300.0, (0.55, 0.30, 1.0), (-1.2, -5.4, 5.0), (2.75, 0.25, 1.0), 20.0, 0.4),
+    ("Key", 1800.0, (1.0, 0.80, 0.56), (-3.2, -5.4, 5.0), (0.0, -0.5, 1.0), 38.0, 0.85),
+    ("Amber", 1900.0, (1.0, 0.52, 0.18), (1.6, -5.4, 5.0), (-3.1, -0.1, 1.2), 29.0, 0.6),
+    ("Violet", 2100.0, (0.66, 0.44, 1.0), (-1.2, -5.4, 5.0), (3.1, -0.1, 1.3), 29.0, 0.6),
     ("Magenta", 900.0, (1.0, 0.12, 0.55), (-2.3, TRUSS_Y, TRUSS_HEIGHT), (0.3, -0.4, 0.9), 42.0, 0.35),
     ("Cyan", 900.0, (0.10, 0.75, 1.0), (2.3, TRUSS_Y, TRUSS_HEIGHT), (-0.3, -0.4, 0.9), 42.0, 0.35),
     ("White", 700.0, (1.0, 0.92, 0.80), (0.0, TRUSS_Y, TRUSS_HEIGHT), (0.0, -1.0, 0.0), 34.0, 0.5),
-    ("Blue wash", 420.0, (0.10, 0.22, 1.0), (-3.0, 1.7, 0.16), (-1.6, 4.2, 2.2), 120.0, 1.0),
-    ("Rose wash", 420.0, (1.0, 0.16, 0.34), (3.0, 1.7, 0.16), (1.6, 4.2, 2.2), 120.0, 1.0),
+    ("Blue wash", 420.0, (0.10, 0.22, 1.0), (-3.0, 1.7, 0.236), (-1.6, 4.2, 2.2), 120.0, 1.0),
+    ("Rose wash", 420.0, (1.0, 0.16, 0.34), (3.0, 1.7, 0.236), (1.6, 4.2, 2.2), 120.0, 1.0),
 ]
 
 
@@ -72,11 +73,14 @@ def build() -> None:
     show(scene, "Standard")
     paint = {name: diffuse(name, colour) for name, colour in PALETTE.items()}
 
+    knot = torus_knot(paint["Ivory"])
+    middle = (0.0, 0.0, PODIUM + 0.302 - float(knot.vertices[:, 2].min()))
+
     receivers = [
         add_mesh("Cyclorama", cyclorama(paint["Backdrop"])),
         add_mesh("Podium", podium(paint["Podium"]), at=(0.0, 0.0, GAP)),
-        add_mesh("Knot plinth", drum(0.34, 0.30, paint["Plinth"]), at=(0.0, 0.0, PODIUM + 2.0 * GAP)),
-        add_mesh("Torus knot", torus_knot(paint["Ivory"]), at=(0.0, 0.0, PODIUM + 0.302)),
+        add_mesh("Knot plinth", drum(0.40, 0.30, paint["Plinth"]), at=(0.0, 0.0, PODIUM + 2.0 * GAP)),
+        add_mesh("Torus knot", knot, at=middle),
         add_mesh("Draped table", draped_table(paint["Cloth"]), at=(-2.75, 0.25, GAP)),
         add_mesh("Amphora", amphora(paint["Gold"]), at=(-2.75, 0.25, 0.902)),
         add_mesh("Dancer plinth", drum(0.52, 0.20, paint["Plinth"]), at=(2.75, 0.25, GAP)),
@@ -84,19 +88,17 @@ def build() -> None:
         add_mesh("Coral ball", sphere(0.34, paint["Coral"], 40), at=(-1.35, -1.75, GAP)),
         add_mesh("Blue ball", sphere(0.22, paint["Blue"], 32), at=(1.70, -1.55, GAP)),
         add_mesh("Ivory ball", sphere(0.13, paint["Ivory"], 28), at=(1.22, -2.0, GAP)),
-        add_mesh("Left column", column(paint["Plaster"]), at=(-4.1, 1.9, GAP)),
-        add_mesh("Right column", column(paint["Plaster"]), at=(4.1, 1.9, GAP)),
-        add_mesh("Left curtain", hanging_cloth(1.9, 5.6, 7, 0.16, paint["Velvet"], 0.02), at=(-4.75, -1.2, 0.01)),
-        add_mesh(
-            "Right curtain", hanging_cloth(1.9, 5.6, 7, 0.16, paint["Velvet"], 0.02), at=(4.75, -1.2, 0.01), turn=180.0
-        ),
-        add_mesh("Truss", truss(paint["Iron"]), at=(0.0, TRUSS_Y + 0.12, TRUSS_HEIGHT + 0.30)),
+        add_mesh("Left column", column(paint["Plaster"]), at=(-3.65, 1.9, GAP)),
+        add_mesh("Right column", column(paint["Plaster"]), at=(3.65, 1.9, GAP)),
+        add_mesh("Left curtain", curtain(paint["Velvet"]), at=(-4.0, -1.2, 0.01)),
+        add_mesh("Right curtain", curtain(paint["Velvet"]), at=(4.0, -1.2, 0.01), turn=180.0),
+        add_mesh("Truss", truss(paint["Iron"]), at=(0.0, TRUSS_Y + 0.12, TRUSS_HEIGHT + 0.34)),
     ]
     for name, power, colour, position, target, angle, blend in SPOTS:
         spot_lamp(name, power, colour, position, target, angle=angle, blend=blend, radius=0.05)
         receivers.append(aim(add_mesh(f"{name} can", can(paint["Iron"]), at=position), target))
-    point_lamp("Ember", 70.0, (1.0, 0.42, 0.12), at=(0.0, 0.0, PODIUM + 0.302 + KNOT_HEIGHT), radius=0.07)
-    add_camera(at=(0.0, -8.6, 1.75), target=(0.0, 0.0, 1.62), focal_length=37.0)
+    point_lamp("Ember", 55.0, (1.0, 0.42, 0.12), at=middle, radius=0.07)
+    add_camera(at=(0.0, -8.6, 1.8), target=(0.0, 0.0, 1.66), focal_length=37.0)
     save(Path(__file__).with_name("stage.blend"), receivers)
 
 
@@ -126,6 +128,10 @@ def podium(material: Material) -> Shape:
     return lathe([*profile, (0.0, PODIUM)], material, 72)
 
 
+def curtain(material: Material) -> Shape:
+    return hanging_cloth((1.9, 5.6), 0.02, material, folds=7, depth=0.16)
+
+
 def drum(radius: float, height: float, material: Material) -> Shape:
     """A round plinth with a chamfered edge."""
     return lathe(
@@ -133,23 +139,18 @@ def drum(radius: float, height: float, material: Material) -> Shape:
     )
 
 
-#: Height of the knot's middle over its lowest point.
-KNOT_HEIGHT = 0.80
-
-
 def torus_knot(material: Material) -> Shape:
-    """The (2, 3) torus knot, upright, its lowest point at z = 0."""
+    """The (2, 3) torus knot, upright, its middle at the origin."""
     t = np.linspace(0.0, 2.0 * pi, 144, endpoint=False)
-    ring = 0.50 + 0.205 * np.cos(3.0 * t)
-    line = np.column_stack([ring * np.sin(2.0 * t), 0.23 * np.sin(3.0 * t), ring * np.cos(2.0 * t)])
-    knot = tube(line, 0.105, material, 20, closed=True)
-    return knot.moved(z=-float(knot.vertices[:, 2].min()))
+    ring = 0.62 + 0.255 * np.cos(3.0 * t)
+    line = np.column_stack([ring * np.sin(2.0 * t), 0.285 * np.sin(3.0 * t), ring * np.cos(2.0 * t)])
+    return tube(line, 0.13, material, 20, closed=True)
 
 
 def draped_table(material: Material) -> Shape:
     """A round table under a cloth that falls to the floor in folds."""
-    edge = curve([(0.44, 0.90), (0.485, 0.87), (0.50, 0.78), (0.53, 0.45), (0.59, 0.15), (0.66, 0.0)], 5)
-    solid = lathe([(0.0, 0.9), (0.22, 0.9), *edge, (0.0, 0.0)], material, 144)
+    edge = curve([(0.44, 0.90), (0.485, 0.87), (0.50, 0.78), (0.53, 0.45), (0.59, 0.15), (0.66, 0.0)], 3)
+    solid = lathe([(0.0, 0.9), (0.22, 0.9), *edge, (0.0, 0.0)], material, 120)
 
     def fold(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         angle, fall = np.arctan2(y, x), np.clip((0.88 - z) / 0.88, 0.0, 1.0)
@@ -173,11 +174,11 @@ def amphora(material: Material) -> Shape:
 
 def dancer(material: Material) -> Shape:
     """A turned figure: a pleated skirt, waist, shoulders, neck and head."""
-    skirt = curve([(0.46, 0.0), (0.44, 0.06), (0.30, 0.34), (0.19, 0.68), (0.115, 0.92)], 6)
-    torso = curve([(0.115, 0.92), (0.17, 1.10), (0.20, 1.24), (0.15, 1.35), (0.065, 1.42), (0.058, 1.48)], 5)
-    angles = np.linspace(-1.12, pi / 2.0, 15)[:-1]
+    skirt = curve([(0.46, 0.0), (0.44, 0.06), (0.30, 0.34), (0.19, 0.68), (0.115, 0.92)], 4)
+    torso = curve([(0.115, 0.92), (0.17, 1.10), (0.20, 1.24), (0.15, 1.35), (0.065, 1.42), (0.058, 1.48)], 3)
+    angles = np.linspace(-1.12, pi / 2.0, 11)[:-1]
     head = [(0.135 * np.cos(a), 1.60 + 0.155 * np.sin(a)) for a in angles]
-    solid = lathe([(0.0, 0.0), *skirt, *torso[1:], *head, (0.0, 1.755)], material, 96)
+    solid = lathe([(0.0, 0.0), *skirt, *torso[1:], *head, (0.0, 1.755)], material, 72)
 
     def pleat(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         angle, fall = np.arctan2(y, x), np.clip((0.9 - z) / 0.9, 0.0, 1.0)
@@ -192,7 +193,7 @@ def column(material: Material) -> Shape:
     base = [(0.0, 0.0), (0.40, 0.0), (0.40, 0.10), (0.36, 0.12), (0.36, 0.17), (0.31, 0.20)]
     shaft = [(0.285 - 0.045 * t, 0.24 + 3.2 * t) for t in np.linspace(0.0, 1.0, 6)]
     capital = [(0.29, 3.50), (0.36, 3.60), (0.36, 3.72), (0.0, 3.72)]
-    solid = lathe([*base, *shaft, *capital], material, 96)
+    solid = lathe([*base, *shaft, *capital], material, 64)
 
     def flute(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         on_shaft = (z > 0.23) & (z < 3.45)
@@ -211,8 +212,8 @@ def truss(material: Material) -> Shape:
     x = np.linspace(-length / 2.0 + 0.1, length / 2.0 - 0.1, bays + 1)
     braces = []
     for k in range(bays):
-        low, high = (0.035, height - 0.035)[:: 1 if k % 2 else -1]
-        braces.append(tube(np.array([(x[k] + 0.02, 0.0, low), (x[k + 1] - 0.02, 0.0, high)]), 0.012, material, 6))
+        low, high = (0.05, height - 0.05)[:: 1 if k % 2 else -1]
+        braces.append(tube(np.array([(x[k] + 0.03, 0.0, low), (x[k + 1] - 0.03, 0.0, high)]), 0.012, material, 6))
     return join([*rails, *braces])
 
 
