@@ -45,8 +45,6 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         return self._attempt(lambda: self._bake_at_once(context))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        if bpy.app.background:  # No window, so no ticks.
-            return self.execute(context)
         return self._attempt(lambda: self._start(context))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

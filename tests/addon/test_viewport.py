@@ -28,7 +28,7 @@ def look(view):
 def test_restore_brings_the_old_look_back(view, kind):
     shading = view.spaces.active.shading
     shading.type = "SOLID"
-    shading.light, shading.color_type, shading.show_cavity = "MATCAP", "RANDOM", True
+    shading.light, shading.color_type, shading.show_cavity = "MATCAP", "TEXTURE", True
     shading.type = kind
     viewport.show(view)
     assert look(view) == viewport.BAKED_LOOK
@@ -36,16 +36,17 @@ def test_restore_brings_the_old_look_back(view, kind):
     viewport.restore(view)
     assert shading.type == kind
     shading.type = "SOLID"
-    assert (shading.light, shading.color_type, shading.show_cavity) == ("MATCAP", "RANDOM", True)
+    assert (shading.light, shading.color_type, shading.show_cavity) == ("MATCAP", "TEXTURE", True)
 
 
 def test_each_view_has_its_own_look(view):
-    other = next(area for area in bpy.data.screens["Modeling"].areas if area.type == "VIEW_3D")
-    before = look(other)
+    other = next(area for area in view.id_data.areas if area != view)
+    other.type = "VIEW_3D"
     viewport.show(view)
-    assert look(other) == before
+    assert look(other) != viewport.BAKED_LOOK
     viewport.show(other)
     viewport.restore(view)
+    assert look(view) != viewport.BAKED_LOOK
     assert look(other) == viewport.BAKED_LOOK
 
 
