@@ -1,17 +1,13 @@
-"""Light at sample points of the receivers: indirect light from the solved patches, and direct light anew.
-
-Every pass puts one new point into each cell, looks around from it, and adds what arrives to the samples of the fit.
-"""
+"""Light at sample points of the receivers: indirect light from the solved patches, and direct light anew."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .direct.illumination import DirectLight
+from .direct.illumination import DirectLight, Illumination
 from .hemisphere import Hemispheres
 from .parallel import Workers
 from .patches import Cells
-from .reconstruction import Samples
 from .sampling import plane_points, stream, triangle_points
 from .scene import Bool, Float32, Float64
 
@@ -61,16 +57,20 @@ def gather_indirect(
 
 def gather_direct(
     points: Points, direct_light: DirectLight, shadow_rays: int, seed: int, number: int, workers: Workers
-) -> tuple[Float64, np.ndarray, int]:
-    """Irradiance (n, 3) straight from lamps and emitting surfaces, the set of lights seen (n,), and the rays cast."""
+) -> Illumination:
+    """Light at the points straight from lamps and emitting surfaces."""
 
-    def work(chunk: int, part: slice) -> tuple[Float64, np.ndarray, int]:
+    def work(chunk: int, part: slice) -> Illumination:
         rng = stream(seed, f"direct {number}", chunk)
-        light = direct_light.at(points.positions[part], points.normals[part], points.shading[part], shadow_rays, rng)
-        return light.irradiance, light.signature, light.rays
+        return direct_light.at(points.positions[part], points.normals[part], points.shading[part], shadow_rays, rng)
 
-    irradiance, signature, rays = zip(*workers.map(work, len(points.positions), _CHUNK), strict=True)
-    return np.concatenate(irradiance), np.concatenate(signature), sum(rays)
+    parts = list(workers.map(work, len(points.positions), _CHUNK))
+    return Illumination(
+        np.concatenate([p.irradiance for p in parts]),
+        np.concatenate([p.variance for p in parts]),
+        np.concatenate([p.signature for p in parts]),
+        sum(p.rays for p in parts),
+    )
 
 
 def shadow_boundary(corner_vertex: np.ndarray, vertices: int, signatures: list[np.ndarray]) -> Bool:

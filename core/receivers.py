@@ -8,6 +8,7 @@ import numpy as np
 
 from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Float64, Int32, Scene, SceneObject
+from .settings import Settings
 from .tessellation import Tessellation, edge_for_count, triform, whole
 
 #: Corners whose shading normals differ by less than this angle (cosine) share one value.
@@ -16,10 +17,11 @@ _SAME_NORMAL = np.cos(np.radians(5.0))
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """meshes: the output mesh of each receiver, in the scene's order; cells: all of them, one after the other.
+    """The output meshes of the receivers, and the cells on all of them.
 
-    first (r + 1,): where each receiver's output triangles begin. corner_vertex (e, 3): the fit vertex of each corner of
-    each output triangle; vertices: how many there are; element_area (e,) in the unit box.
+    first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
+    the unit box, element_surface (e,) into Scene.surfaces, corner_vertex (e, 3) the fit vertex of each of their corners;
+    vertices: how many fit vertices there are.
     """
 
     objects: tuple[SceneObject, ...]
@@ -32,12 +34,13 @@ class Receivers:
     vertices: int
 
 
-def make_receivers(scene: Scene, space: Space, *, tessellate: bool, size: float | None, triangles: int) -> Receivers:
-    """Tessellate the receivers to edges of at most `size` metres, or to about `triangles` triangles in all.
+def make_receivers(scene: Scene, space: Space, settings: Settings) -> Receivers:
+    """Tessellate the receivers to edges of the asked size, or to about the asked number of triangles in all.
 
-    Without `tessellate` the output keeps the input's triangles, and only the sampling is as fine as that.
+    Where the mesh is to be kept, the output has the input's triangles, and only the sampling is as fine as that.
     """
     objects = scene.receivers()
+    tessellate, size, triangles = settings.tessellate, settings.size, settings.triangles
     edge = size or edge_for_count([o.vertices for o in objects], [o.triangles for o in objects], triangles)
     fine = [triform(whole(o.vertices, o.triangles), edge) for o in objects]
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]

@@ -14,8 +14,10 @@ import numpy as np
 from .receivers import Receivers, shared_edges
 from .scene import Bool, Float64, Int32
 
-_TOLERANCE = 1e-5
+_TOLERANCE = 1e-4
 _MAXIMUM_ITERATIONS = 100
+#: Entries of a row of the fit's matrix that are kept in line: more than a vertex of a sound mesh has.
+_WIDTH = 24
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 
@@ -50,6 +52,14 @@ class Samples:
             value += getattr(self, name) + getattr(other, name)
         return total
 
+    def channel(self, k: int) -> Samples:
+        """The same samples with channel k alone."""
+        alone = Samples(0, 1)
+        alone.moments, alone.count = self.moments, self.count
+        for name in ("light", "noise", "squares"):
+            setattr(alone, name, getattr(self, name)[..., k][..., None])
+        return alone
+
     def squared_residual(self, corners: Float64) -> Float64:
         """Mean (c, k) of (sample - interpolated)^2 over each cell's samples, for corner values (c, 3, k)."""
         product = corners[:, _ROW] * corners[:, _COLUMN]
@@ -59,20 +69,31 @@ class Samples:
         return np.maximum(total, 0.0) / np.maximum(self.count, 1.0)[:, None]
 
 
-@dataclass(frozen=True, eq=False)
 class SparseMatrix:
-    """Symmetric matrix in rows: for row i, columns and values between indptr[i] and indptr[i + 1]. No empty rows."""
+    """Rows of about equal length, padded: columns and values (v, w). What a row has beyond w is kept aside."""
 
-    indptr: Int32
-    columns: Int32
-    values: Float64
+    def __init__(self, indptr: np.ndarray, columns: np.ndarray, values: Float64) -> None:
+        length = np.diff(indptr)
+        width = int(min(length.max(initial=1), _WIDTH))
+        place = indptr[:-1, None] + np.arange(width)
+        filled = np.arange(width) < length[:, None]
+        place = np.where(filled, place, 0)
+        self._columns = columns[place]
+        self._values = np.where(filled, values[place], 0.0)
+        row = np.repeat(np.arange(len(length)), length)
+        beyond = np.arange(len(columns)) - indptr[row] >= width
+        self._rest = (row[beyond], columns[beyond], values[beyond])
+        self.diagonal = np.bincount(row, values * (columns == row), len(length))
 
     def __matmul__(self, x: Float64) -> Float64:
         """(v, k) to (v, k)."""
+        row, column, value = self._rest
         product = np.empty_like(x)
-        for channel in range(x.shape[1]):
-            column = np.ascontiguousarray(x[:, channel])
-            product[:, channel] = np.add.reduceat(self.values * column[self.columns], self.indptr[:-1])
+        for k in range(x.shape[1]):
+            channel = np.ascontiguousarray(x[:, k])
+            product[:, k] = np.einsum("vw,vw->v", self._values, channel[self._columns])
+            if len(row):
+                product[:, k] += np.bincount(row, value * channel[column], len(x))
         return product
 
 
@@ -85,7 +106,7 @@ class Pattern:
         ordered = key[self._order]
         self._start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
         row, column = np.divmod(ordered[self._start], count)
-        self._columns = column.astype(np.int32)
+        self._columns = column
         self._indptr = np.searchsorted(row, np.arange(count + 1))
         self._count = count
 
@@ -109,15 +130,15 @@ class System:
 class Fit:
     """Least squares onto the fit vertices of the receivers.
 
-    total: all samples there are; where none is valid the fit has nothing to say, and `fill` does. The samples given to
-    `solve` may be a part of them.
+    count (c,): valid samples of each cell; where there is none the fit has nothing to say, and `fill` does.
     """
 
-    def __init__(self, receivers: Receivers, total: Samples) -> None:
+    def __init__(self, receivers: Receivers, count: Float64) -> None:
         self._receivers = receivers
         self._count = receivers.vertices
         self._corner = receivers.corner_vertex[receivers.cells.element]
-        self.measured = self._scatter(total.moments[:, :3]) > 0
+        sampled = (count > 0)[:, None] & (receivers.cells.barycentric.max(axis=1) > 0)
+        self.measured = self._scatter(sampled) > 0
         vertex, jump, weight = gradient_jumps(receivers, self.measured)
         penalty = weight[:, None, None] * jump[:, :, None] * jump[:, None, :]
         row = np.concatenate([self._corner[:, _ROW], self._corner[:, _COLUMN[3:]]], axis=1).ravel()
@@ -141,11 +162,16 @@ class Fit:
         target = np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1)
         return System(mass, target, self._scatter(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]]))
 
-    def solve(self, system: System, alpha: float) -> Float64:
-        """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha."""
+    def solve(self, system: System, alpha: float, start: Float64 | None = None) -> Float64:
+        """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha.
+
+        start (v, k): where to begin; by default plain averaging, which is near already.
+        """
         matrix = self._pattern.matrix(system.mass + alpha * self._penalty)
-        averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
-        return conjugate_gradients(matrix, system.target, np.where(self.measured[:, None], averaged, 0.0))
+        if start is None:
+            averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
+            start = np.where(self.measured[:, None], averaged, 0.0)
+        return conjugate_gradients(matrix, system.target, start)
 
     def at_corners(self, values: Float64) -> Float64:
         """(c, 3, k): what interpolation of vertex values (v, k) starts from in each cell's output triangle."""
@@ -213,8 +239,7 @@ def _third(ends: np.ndarray) -> np.ndarray:
 
 def conjugate_gradients(matrix: SparseMatrix, target: Float64, start: Float64) -> Float64:
     """Solve matrix x = target (v, k) with Jacobi scaling; rows without weight keep their start."""
-    row = np.repeat(np.arange(len(target)), np.diff(matrix.indptr))
-    diagonal = matrix.values[matrix.columns == row]
+    diagonal = matrix.diagonal
     inverse = np.where(diagonal > 0, 1.0 / np.where(diagonal > 0, diagonal, 1.0), 0.0)[:, None]
     x = start
     residual = target - matrix @ x

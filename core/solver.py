@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .form_factors.rows import Rows
+from .parallel import Workers
 from .scene import Float64
 
 #: Shooting passes before the finish: what the first bounces bring is what a person watches.
@@ -28,7 +29,9 @@ class Solution:
     bound: float
 
 
-def shoot(factors: Rows, albedo: Float64, direct: Float64) -> Iterator[tuple[Float64, Float64]]:
+def shoot(
+    factors: Rows, albedo: Float64, direct: Float64, workers: Workers | None = None
+) -> Iterator[tuple[Float64, Float64]]:
     """Accumulated and residual irradiance (s, c), pass by pass: each pass shoots all that is unshot.
 
     Cohen, Chen, Wallace, Greenberg 1988, all patches at once. Runs for as long as the caller wants more.
@@ -37,49 +40,71 @@ def shoot(factors: Rows, albedo: Float64, direct: Float64) -> Iterator[tuple[Flo
     residual = np.array(direct, dtype=np.float64)
     while True:
         yield accumulated, residual
-        residual = factors.apply(albedo * residual)
+        residual = factors.apply(albedo * residual, workers)
         accumulated = accumulated + residual
 
 
+def shoot_until(
+    factors: Rows, albedo: Float64, direct: Float64, tolerance: float, workers: Workers | None = None
+) -> Solution:
+    """Plain shooting passes until what a pass brings is under `tolerance`, as the original program did.
+
+    With rows that sum to more than one the light may grow for ever; after the last allowed pass it stands as it is.
+    """
+    for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
+        left = _relative(residual, accumulated)
+        if left <= tolerance or done == _MAXIMUM_ITERATIONS:
+            break
+    return Solution(accumulated, done, left)
+
+
 def contraction(factors: Rows, albedo: Float64) -> float:
-    """q = the largest share of the light on any side that comes back from it: albedo times row sum."""
+    """Q = the largest share of the light on any side that comes back from it: albedo times row sum."""
     return float(np.max(albedo.max(axis=1) * factors.row_sums(), initial=0.0))
 
 
-def solve(exchange: Rows, area: Float64, albedo: Float64, direct: Float64, tolerance: float) -> Solution:
-    """Irradiance H (s, c) of each side, to a relative error of at most `tolerance`.
+def solve(
+    exchange: Rows, area: Float64, albedo: Float64, direct: Float64, tolerance: float, workers: Workers | None = None
+) -> Solution:
+    """Irradiance H (s, c) of each side, to a relative error of at most `tolerance` of each channel's largest.
 
     exchange: symmetric exchange areas G_ij = A_i F_ij; area (s,); albedo, direct (s, c). With z = sqrt(albedo) H the
     system (A - s G s) z = s A E is symmetric and positive definite, and conjugate gradients finish what shooting began.
     """
-    factors = Rows(exchange.indptr, exchange.columns, (exchange.weights / area[exchange.owners()]).astype(np.float32))
-    passes = shoot(factors, albedo, direct)
-    for done in range(_WATCHED_PASSES + 1):
-        accumulated, residual = next(passes)
-        q = contraction(factors, albedo)
-        scale = np.maximum(np.abs(accumulated).max(axis=0), np.finfo(float).tiny)
-        bound = float(np.max(np.abs(residual).max(axis=0) * q / scale)) / max(1.0 - q, 1e-12)
+    factors = exchange.scaled(1.0 / area)
+    q = contraction(factors, albedo)
+    for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
+        # Every later pass brings at most q times the pass before it: the rest of the series is geometric.
+        bound = _relative(residual * q, accumulated) / max(1.0 - q, 1e-12)
         if bound <= tolerance:
             return Solution(accumulated, done, bound)
-    return _conjugate_gradients(exchange, factors, area, albedo, direct, accumulated, tolerance)
+        if done == _WATCHED_PASSES:
+            break
+    return _conjugate_gradients(exchange, factors, area, albedo, direct, accumulated, tolerance, q, workers)
 
 
 def _conjugate_gradients(
-    exchange: Rows, factors: Rows, area: Float64, albedo: Float64, direct: Float64, start: Float64, tolerance: float
+    exchange: Rows,
+    factors: Rows,
+    area: Float64,
+    albedo: Float64,
+    direct: Float64,
+    start: Float64,
+    tolerance: float,
+    q: float,
+    workers: Workers | None,
 ) -> Solution:
     root = np.sqrt(albedo)
     weight = 1.0 / area[:, None]
-    q = contraction(factors, albedo)
 
     def operator(z: Float64) -> Float64:
-        return area[:, None] * z - root * exchange.apply(root * z)
+        return area[:, None] * z - root * exchange.apply(root * z, workers)
 
     z = root * start
     residual = root * area[:, None] * direct - operator(z)
     preconditioned = weight * residual
     direction = preconditioned.copy()
     energy = np.sum(residual * preconditioned, axis=0)
-    irradiance, bound = start, np.inf
     for iteration in range(1, _MAXIMUM_ITERATIONS + 1):
         image = operator(direction)
         step = energy / np.maximum(np.sum(direction * image, axis=0), np.finfo(float).tiny)
@@ -89,11 +114,15 @@ def _conjugate_gradients(
         fresh = np.sum(residual * preconditioned, axis=0)
         direction = preconditioned + fresh / np.maximum(energy, np.finfo(float).tiny) * direction
         energy = fresh
-        irradiance = direct + factors.apply(root * z)
-        # One more Jacobi step would move the light by at most this; the rest of the series is geometric.
-        moved = np.abs(factors.apply(albedo * irradiance - root * z)).max(axis=0)
-        scale = np.maximum(np.abs(irradiance).max(axis=0), np.finfo(float).tiny)
-        bound = float(np.max(moved / scale)) / max(1.0 - q, 1e-12)
+        # One more pass would move the reflected light, root z, by root times the scaled residual.
+        bound = _relative(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
         if bound <= tolerance:
             break
+    irradiance = direct + factors.apply(root * z, workers)
     return Solution(np.maximum(irradiance, 0.0), _WATCHED_PASSES + iteration, bound)
+
+
+def _relative(change: Float64, whole: Float64) -> float:
+    """The largest change (s, c) of any side, relative to the channel's largest value."""
+    scale = np.maximum(np.abs(whole).max(axis=0), np.finfo(float).tiny)
+    return float(np.max(np.abs(change).max(axis=0) / scale))

@@ -116,18 +116,29 @@ def _templates(count: np.ndarray, vertices: Float64, six: Int32) -> list[tuple[n
 def edge_for_count(vertices: list[Float64], triangles: list[Int32], wanted: int) -> float:
     """The longest edge (metres) at which the meshes together split into about `wanted` triangles.
 
-    The count jumps by up to four where many edges have the same length, so it is met within a factor of two at worst.
+    The count jumps by two or four where many edges have the same length, so it is met within a factor of two at worst.
     """
-    corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    edges = np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2)
-    guess = np.sqrt(2.0 * areas.sum() / max(wanted, 1)) * np.sqrt(2.0)
-    candidates = guess * 2.0 ** np.linspace(-2, 2, 33)
-    counts = np.array([_predicted_count(edges, size) for size in candidates])
+    edges, area = _edges_and_area(vertices, triangles)
+    guess = 2.0 * np.sqrt(area / max(wanted, 1))
+    # The nearest to the guess first: where the input is denser than wanted, every size gives the same count.
+    candidates = guess * 2.0 ** np.array(sorted(np.linspace(-2, 2, 33), key=abs))
+    counts = np.array([_count(edges, size) for size in candidates])
     return float(candidates[np.argmin(np.abs(np.log(counts / wanted)))])
 
 
-def _predicted_count(edges: Float64, size: float) -> float:
+def predicted_count(vertices: list[Float64], triangles: list[Int32], longest_edge: float) -> int:
+    """About how many triangles the meshes together split into."""
+    return int(_count(_edges_and_area(vertices, triangles)[0], longest_edge))
+
+
+def _edges_and_area(vertices: list[Float64], triangles: list[Int32]) -> tuple[Float64, float]:
+    """Edge lengths (t, 3) of all triangles, and their area."""
+    corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
+    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2), float(np.linalg.norm(cross, axis=1).sum()) / 2
+
+
+def _count(edges: Float64, size: float) -> float:
     """Triangles after splitting, from the number of halvings of each edge: exact for three equal depths."""
     depth = np.maximum(np.ceil(np.log2(np.maximum(edges, 1e-300) / size) - 1e-9), 0.0)
     depth.sort(axis=1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..sampling import GOLDEN, stream
-from ..scene import Bool, Float64
+from ..scene import Bool, Float32, Float64
 from ..visibility import Visibility, offset_along
 from .lamps import Light
 
@@ -17,10 +17,11 @@ _NEGLIGIBLE = 1e-7
 
 @dataclass(frozen=True, eq=False)
 class Illumination:
-    """irradiance (n, 3) W/m^2; signature (n,) int64: equal numbers see the same lights whole, and -1 sees some light
-    in part; rays cast."""
+    """irradiance (n, 3) W/m^2 and its variance (n, 3); signature (n,) int64: equal numbers see the same lights whole,
+    and -1 sees some light in part; rays cast."""
 
     irradiance: Float64
+    variance: Float64
     signature: np.ndarray
     rays: int
 
@@ -34,9 +35,11 @@ class DirectLight:
         # A random bit pattern for each light: the sum over the lights seen names their set.
         self._names = stream(seed, "light names").integers(1, 2**40, size=len(lights))
 
-    def at(self, points: Float64, normals: Float64, shading: Float64, rays: int, rng: np.random.Generator) -> Illumination:
+    def at(
+        self, points: Float64, normals: Float64, shading: Float64, rays: int, rng: np.random.Generator
+    ) -> Illumination:
         """At points (n, 3) with geometric and shading normals (n, 3), `rays` shadow rays to each sized light."""
-        irradiance = np.zeros((len(points), 3))
+        irradiance, variance = np.zeros((2, len(points), 3))
         signature = np.zeros(len(points), dtype=np.int64)
         partly = np.zeros(len(points), dtype=bool)
         cast = 0
@@ -44,38 +47,43 @@ class DirectLight:
         for light, name in zip(self.lights, self._names, strict=True):
             share = light.unoccluded(points, shading)
             lit = np.flatnonzero(share * light.color.max() > _NEGLIGIBLE * irradiance.max(axis=1, initial=0.0))
-            lit = lit[share[lit] > 0]
             if not len(lit):
                 continue
-            count = rays if light.sized else 1
-            free, weights = self._free(light, points[lit], normals[lit], shading[lit], origins[lit], count, rng)
+            # Two independent halves of the targets: how much they differ is how far their mean can be trusted.
+            halves = 2 if light.sized else 1
+            per_half = max(1, rays // 2) if light.sized else 1
+            unit = _lattices(len(lit), halves, per_half, rng)
+            targets, weights = light.aim(points[lit], shading[lit], unit.reshape(len(lit), -1, 2))
+            free = self._free(points[lit], normals[lit], origins[lit], targets, weights)
             cast += free.size
-            total = weights.sum(axis=1)
-            visible = np.where(total > 0, (weights * free).sum(axis=1) / np.maximum(total, 1e-300), 0.0)
-            irradiance[lit] += (share[lit] * visible)[:, None] * light.color
-            some, all_of_it = free.any(axis=1), free.all(axis=1)
+            visible = _weighted_share(free.reshape(-1, halves, per_half), weights.reshape(-1, halves, per_half))
+            arriving = (share[lit, None] * visible)[:, :, None] * light.color
+            irradiance[lit] += arriving.mean(axis=1)
+            if halves == 2:
+                variance[lit] += (arriving[:, 0] - arriving[:, 1]) ** 2 / 4.0
+            all_of_it = free.all(axis=1)
             signature[lit] += np.where(all_of_it, name, 0)
-            partly[lit] |= some & ~all_of_it
+            partly[lit] |= free.any(axis=1) & ~all_of_it
         signature[partly] = -1
-        return Illumination(irradiance, signature, cast)
+        return Illumination(irradiance, variance, signature, cast)
 
-    def _free(
-        self,
-        light: Light,
-        points: Float64,
-        normals: Float64,
-        shading: Float64,
-        origins: np.ndarray,
-        count: int,
-        rng: np.random.Generator,
-    ) -> tuple[Bool, Float64]:
-        """Which of `count` targets spread over the light are free (n, count), and the weight of each."""
-        shift = rng.random((len(points), 1, 2))
-        lattice = np.column_stack([(np.arange(count) + 0.5) / count, np.arange(count) * GOLDEN])
-        targets, weights = light.aim(points, shading, (lattice + shift) % 1.0)
+    def _free(self, points: Float64, normals: Float64, origins: Float32, targets: Float64, weights: Float64) -> Bool:
+        """Which targets (n, r, 3) can be seen; those that shed nothing count as seen."""
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
         above = np.einsum("nrk,nk->nr", targets - points[:, None], normals) > 0
-        free = np.zeros(above.shape, dtype=bool)
-        index = np.nonzero(above & (weights > 0))
+        free = weights == 0
+        index = np.nonzero(above & ~free)
         free[index] = self._visibility.unblocked(origins[index[0]], targets[index].astype(np.float32))
-        return free | (weights == 0), weights
+        return free
+
+
+def _lattices(points: int, halves: int, count: int, rng: np.random.Generator) -> Float64:
+    """(points, halves, count, 2): even sets of the unit square, each shifted by itself."""
+    lattice = np.column_stack([(np.arange(count) + 0.5) / count, np.arange(count) * GOLDEN])
+    return np.asarray((lattice + rng.random((points, halves, 1, 2))) % 1.0)
+
+
+def _weighted_share(free: Bool, weights: Float64) -> Float64:
+    """(n, halves): the share of the weight (n, halves, r) that is free."""
+    total = weights.sum(axis=2)
+    return np.asarray(np.divide((weights * free).sum(axis=2), total, out=np.zeros_like(total), where=total > 0))

@@ -42,7 +42,7 @@ _RULES: tuple[tuple[float, Float64, Float64], ...] = (
     ),
 )
 #: Radii of the balls about both triangles / distance, up to which one and four rays are enough.
-_ONE_RAY, _FOUR_RAYS = 0.1, 0.5
+_ONE_RAY, _FOUR_RAYS = 0.2, 0.5
 #: Between which parts of the two triangles rays run, from the farthest to the nearest pairs.
 _WHOLE: Float64 = np.eye(3)[None]
 _WAYS = (

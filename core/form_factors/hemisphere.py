@@ -25,11 +25,13 @@ SITES = 4
 class Sides:
     """The sides of patches that can exchange light: every front, and each back that some ray can reach.
 
-    side (s,) int32: patch index for a front, patch index + number of patches for a back. area (s,) in the unit box.
+    side (s,) int32: patch index for a front, patch index + number of patches for a back. area (s,) in the unit box: of
+    the part that is not inside a solid.
     """
 
     patches: Patches
     side: Int32
+    area: Float64
 
     @property
     def patch(self) -> Int32:
@@ -40,12 +42,12 @@ class Sides:
         return self.side >= len(self.patches)
 
     @property
-    def area(self) -> Float64:
-        return self.patches.patch_area[self.patch]
-
-    @property
     def albedo(self) -> Float32:
         return self.patches.albedo[self.patch]
+
+    @property
+    def emission(self) -> Float32:
+        return self.patches.emission[self.patch]
 
     def sites(self, seed: int, purpose: str, number: int) -> tuple[Float64, Float64]:
         """One random point (s, 3) on each side, the number-th of an even sequence, and its normal (s, 3)."""
@@ -63,6 +65,18 @@ class Sides:
         return points, patches.normals[triangle] * np.where(self.back, -1.0, 1.0)[:, None]
 
 
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """What the rays of sides met, before it is put into rows: `length` entries a side, the side met (global number) and
+    the hits on it; rays `escaped` and rays that `count` a side."""
+
+    length: np.ndarray
+    column: np.ndarray
+    hits: np.ndarray
+    escaped: np.ndarray
+    counted: np.ndarray
+
+
 def hemisphere_rows(
     patches: Patches, visibility: Visibility, workers: Workers, *, rays: int, seed: int, purpose: str
 ) -> tuple[Sides, Rows, Float64]:
@@ -78,52 +92,82 @@ def hemisphere_rows(
     side, parts = [], []
     while len(fresh):
         side.append(fresh)
-        parts.append(_sample(Sides(patches, fresh), hemispheres, workers, seed, f"{purpose} {len(parts)}"))
+        parts.append(_look_around(_sides(patches, fresh), hemispheres, workers, seed, f"{purpose} {len(parts)}"))
         reached = np.zeros(2 * count, dtype=bool)
-        reached[parts[-1][1]] = True
+        reached[parts[-1].column] = True
         fresh = np.flatnonzero(reached & ~met).astype(np.int32)
         met |= reached
-    sides = Sides(patches, np.concatenate(side))
-    length, column, hits, escaped = (np.concatenate(p) for p in zip(*parts, strict=True))
+    length, column, hits, escaped, counted = (
+        np.concatenate([getattr(p, f) for p in parts]) for f in ("length", "column", "hits", "escaped", "counted")
+    )
+    sides = _sides(patches, np.concatenate(side), counted / (SITES * hemispheres.rays))
     number = np.full(2 * count, -1, dtype=np.int32)
     number[sides.side] = np.arange(len(sides.side), dtype=np.int32)
-    indptr = np.concatenate([[0], np.cumsum(length)]).astype(np.int64)
-    total = SITES * hemispheres.rays
-    return sides, Rows(indptr, number[column], (hits / total).astype(np.float32)), escaped / total
+    weights = (hits / np.repeat(counted, length)).astype(np.float32)
+    rows = Rows(np.concatenate([[0], np.cumsum(length)]).astype(np.int64), number[column], weights)
+    return sides, _mutual(rows, sides.back), escaped / counted
 
 
-def _sample(
-    sides: Sides, hemispheres: Hemispheres, workers: Workers, seed: int, purpose: str
-) -> tuple[np.ndarray, ...]:
-    """Entries of the rows of these sides: how many each row has, the sides met, the hits on each; rays escaped."""
+def _sides(patches: Patches, side: Int32, open_share: Float64 | float = 1.0) -> Sides:
+    return Sides(patches, side, patches.patch_area[side % np.int32(len(patches))] * open_share)
+
+
+def _look_around(sides: Sides, hemispheres: Hemispheres, workers: Workers, seed: int, purpose: str) -> Sights:
     patches = sides.patches
     codes = hemispheres.codes
-    # From a ray's code to the side it met; escaped and lost rays go to a column beyond all sides.
-    beyond = 2 * len(patches)
-    side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [beyond, beyond]]).astype(np.int32)
+    # From a ray's code to the side it met. Escaped rays go to a column beyond all sides, ignored ones beyond that.
+    escaped, ignored = 2 * len(patches), 2 * len(patches) + 1
+    side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [escaped, ignored]]).astype(np.int32)
     sites = [sides.sites(seed, purpose, number) for number in range(SITES)]
 
     def work(number: int, part: slice) -> tuple[np.ndarray, ...]:
         rng = stream(seed, "rows " + purpose, number)
-        met = [hemispheres.cast(points[part], normals[part], normals[part], rng) for points, normals in sites]
-        columns = side_of_code[np.concatenate(met, axis=1)]
+        met = np.stack([hemispheres.cast(p[part], n[part], n[part], rng) for p, n in sites], axis=1)
+        columns = side_of_code[met]
+        behind = ((met >= codes.triangles) & (met < codes.escaped)).mean(axis=2)
+        columns[_hidden(behind)] = ignored
+        columns = columns.reshape(len(met), -1)
         columns.sort(axis=1)
-        return _run_lengths(columns, beyond)
+        return _run_lengths(columns, escaped)
 
-    parts = list(workers.map(work, len(sides.side), hemispheres.chunk))
-    length, column, hits, escaped = (np.concatenate(p) for p in zip(*parts, strict=True))
-    return length, column, hits, escaped
+    return Sights(
+        *(np.concatenate(p) for p in zip(*workers.map(work, len(sides.side), hemispheres.chunk), strict=True))
+    )
 
 
-def _run_lengths(columns: np.ndarray, beyond: int) -> tuple[np.ndarray, ...]:
-    """Sorted columns (n, k) to entries: how many each row has, their columns, their counts, and the row's escapes."""
+def _hidden(behind: Float64) -> np.ndarray:
+    """Sites (n, sites) of a patch that lie inside a solid while others do not, by their share of rays that meet backs.
+
+    Such a patch runs under an object that stands on it; only its open part takes part in the exchange of light.
+    """
+    inside, outside = behind > 0.95, behind < 0.6
+    return inside & outside.any(axis=1, keepdims=True)
+
+
+def _run_lengths(columns: np.ndarray, escaped: int) -> tuple[np.ndarray, ...]:
+    """Sorted columns (n, k) to the fields of Sights."""
     rays = columns.shape[1]
     new = np.ones(columns.shape, dtype=bool)
     new[:, 1:] = columns[:, 1:] != columns[:, :-1]
     start = np.flatnonzero(new)
-    count = np.diff(start, append=columns.size)
+    hits = np.diff(start, append=columns.size)
     column = columns.reshape(-1)[start]
-    escaped = np.count_nonzero(columns == beyond, axis=1)
-    kept = column != beyond
+    kept = column < escaped
     length = np.bincount(start[kept] // rays, minlength=len(columns))
-    return length, column[kept], count[kept], escaped
+    out = np.count_nonzero(columns == escaped, axis=1)
+    return length, column[kept], hits[kept], out, np.count_nonzero(columns <= escaped, axis=1)
+
+
+def _mutual(rows: Rows, back: np.ndarray) -> Rows:
+    """Leave out what only one of a front and a back has seen: a back that lies inside a solid sees the part of a patch
+    that runs under it, and would lead the light of the open part inside."""
+    owner = rows.owners()
+    mixed = np.flatnonzero(back[owner] != back[rows.columns])
+    if not len(mixed):
+        return rows
+    i, j = owner[mixed], rows.columns[mixed].astype(np.int64)
+    alone = ~np.isin(i * len(rows) + j, j * len(rows) + i)
+    kept = np.ones(len(owner), dtype=bool)
+    kept[mixed[alone]] = False
+    length = np.bincount(owner[kept], minlength=len(rows))
+    return Rows(np.concatenate([[0], np.cumsum(length)]).astype(np.int64), rows.columns[kept], rows.weights[kept])

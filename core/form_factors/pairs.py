@@ -23,8 +23,8 @@ from .rows import Rows
 
 Index = NDArray[np.int64]
 
-#: Pairs a chunk of work.
-_CHUNK_PAIRS = 1 << 18
+#: Pairs a chunk of work: few enough for even loads on the threads and for arrays that stay near the processor.
+_CHUNK_PAIRS = 1 << 15
 #: Height over a plane, in the unit box, from which a vertex counts as in front of it.
 _IN_FRONT = 1e-7
 #: Rays a side that find out which backs take part and whether a side sees any sky at all.

@@ -71,6 +71,11 @@ class Rows:
         """(n,) sum of each row, in float64."""
         return _sums(self.owners(), self.weights, len(self))
 
+    def scaled(self, factors: ArrayLike) -> Rows:
+        """Row i times factors[i]."""
+        weights = self.weights * np.asarray(factors, dtype=np.float64)[self.owners()]
+        return Rows(self.indptr, self.columns, weights.astype(np.float32))
+
     def apply(self, x: ArrayLike, workers: Workers | None = None) -> Float64:
         """The matrix times x (columns, c), or (columns,): (n, c), or (n,), float64.
 

@@ -1,0 +1,64 @@
+"""What cannot be baked is refused before any work, by the name of what is wrong and what to do about it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .scene import ALBEDO_LIMIT, Scene, SceneError, SceneObject, Surface
+
+#: Beyond this many half extents from the origin, single precision shows in the result.
+_FAR = 1e5
+
+
+def check_scene(scene: Scene) -> Scene:
+    """The scene in an order that does not depend on that of its objects, with warnings. Raises SceneError."""
+    objects = tuple(sorted((o for o in scene.objects if len(o.triangles)), key=lambda o: o.name))
+    if not any(o.receives for o in objects):
+        raise SceneError("Nothing to bake: no object with faces was chosen. Select a mesh object and bake again.")
+    for scene_object in objects:
+        _check_object(scene_object, len(scene.surfaces))
+    warnings = list(scene.warnings)
+    surfaces = tuple(_check_surface(surface, warnings) for surface in scene.surfaces)
+    for lamp in scene.lamps:
+        if not np.isfinite(np.concatenate([np.ravel(v) for v in vars(lamp).values() if not isinstance(v, str)])).all():
+            raise SceneError(f"Lamp '{lamp.name}' has a value that is not a number: check its transform and its power.")
+    extent = max(float(np.ptp(o.vertices, axis=0).max()) for o in objects)
+    away = max(float(np.abs(o.vertices).max()) for o in objects)
+    if away > _FAR * max(extent, np.finfo(float).tiny):
+        warnings.append(
+            f"The scene is {away / extent:,.0f} times its own size away from the origin, where Blender's coordinates "
+            "are coarse: move it nearer for an exact bake."
+        )
+    return replace(
+        scene,
+        objects=objects,
+        surfaces=surfaces,
+        lamps=tuple(sorted(scene.lamps, key=lambda lamp: lamp.name)),
+        warnings=tuple(warnings),
+    )
+
+
+def _check_object(scene_object: SceneObject, surfaces: int) -> None:
+    name, vertices, triangles = scene_object.name, scene_object.vertices, scene_object.triangles
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise SceneError(f"'{name}' has faces that use vertices which do not exist: run Mesh > Clean Up > Validate.")
+    if len(scene_object.surface) != len(triangles) or scene_object.surface.max() >= surfaces:
+        raise SceneError(f"'{name}' has faces whose material does not exist: assign a material to all of them.")
+    if not np.isfinite(vertices[triangles]).all():
+        raise SceneError(f"'{name}' has vertices without finite coordinates: delete them, or undo what made them.")
+
+
+def _check_surface(surface: Surface, warnings: list[str]) -> Surface:
+    values = np.array([*surface.albedo, *surface.emission])
+    if not np.isfinite(values).all() or values.min() < 0:
+        raise SceneError(f"Material '{surface.name}' has a colour that is negative or not a number: pick another.")
+    if max(surface.albedo) <= ALBEDO_LIMIT:
+        return surface
+    warnings.append(
+        f"Material '{surface.name}' reflects all light or more; {ALBEDO_LIMIT:.2%} is used. Nothing real is whiter "
+        "than fresh snow at 90 %: pick a darker colour."
+    )
+    red, green, blue = (min(channel, ALBEDO_LIMIT) for channel in surface.albedo)
+    return replace(surface, albedo=(red, green, blue))

@@ -1,0 +1,115 @@
+"""Sampling until the asked error or the asked time is met, and the light that comes of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil
+from time import perf_counter
+
+import numpy as np
+
+from .accuracy import ErrorEstimate, Fitted, estimate_error, fit_halves
+from .clock import Clock
+from .plan import Effort
+from .reconstruction import Fit
+from .scene import Float64, Scene
+from .settings import Settings
+from .survey import Survey
+
+#: Sampling and resolution share the asked error; below this share of the resolution, sampling no longer shows.
+_SAMPLING_SHARE, _RESOLUTION_SHARE = 0.7, 0.35
+_MOST_ROUNDS, _MOST_PASSES = 3, 128
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
+
+    reflected, emitted, lamps (v, 3); open_sky (v,) share of the hemisphere; error; cell_error (c,) mean square of each
+    cell's radiance error; unfilled: vertices that no sample could be taken at.
+    """
+
+    reflected: Float64
+    open_sky: Float64
+    emitted: Float64
+    lamps: Float64
+    error: ErrorEstimate
+    cell_error: Float64
+    unmeasured: int
+
+
+def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, clock: Clock) -> Light:
+    """Passes until the estimated error, or the clock, says so."""
+    begun = perf_counter()
+    with clock.stage("gather", 0.3):
+        for number in range(effort.passes):
+            clock.progress.report("gather", 0.3 + 0.4 * number / effort.passes)
+            survey.run_pass()
+        survey.refine_boundaries(effort.boundary_passes)
+    seconds_per_pass = (perf_counter() - begun) / effort.passes
+    for round_number in range(_MOST_ROUNDS):
+        begun = perf_counter()
+        with clock.stage("fit", 0.75 + 0.05 * round_number):
+            light = fit_light(survey, scene)
+        seconds_to_fit = perf_counter() - begun
+        more = _passes_wanted(survey, light.error, settings)
+        if settings.seconds is not None:
+            left = settings.seconds - clock.elapsed - seconds_to_fit
+            more = min(more, int(left / seconds_per_pass) // 2 * 2)
+        if more < 2:
+            break
+        with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
+            for _ in range(more):
+                survey.run_pass()
+            survey.refine_boundaries(more)
+    else:
+        with clock.stage("fit", 0.95, light.error.total):
+            light = fit_light(survey, scene)
+    return light
+
+
+def _passes_wanted(survey: Survey, error: ErrorEstimate, settings: Settings) -> int:
+    """How many more passes bring sampling down to what is asked, or to where the mesh cannot show it; an even number."""
+    if settings.error is None:
+        return _MOST_PASSES if settings.seconds is not None else 0
+    target = max(_SAMPLING_SHARE * settings.error, _RESOLUTION_SHARE * error.resolution)
+    wanted = survey.passes * (error.sampling / target) ** 2
+    return min(2 * ceil((wanted - survey.passes) / 2), _MOST_PASSES)
+
+
+def fit_light(survey: Survey, scene: Scene) -> Light:
+    """Least squares onto the vertices, for indirect and direct light each with the smoothing it needs."""
+    receivers = survey.receivers
+    cells = receivers.cells
+    fit = Fit(receivers, survey.valid_samples)
+    direct = fit_halves(fit, survey.direct, cells.area)
+    indirect = fit_halves(fit, survey.indirect, cells.area)
+    radiance = _mean_radiance(survey, scene, direct, indirect)
+    albedo = np.array([s.albedo for s in scene.surfaces])[cells.surface]
+    error, cell_error = estimate_error(
+        [direct, indirect],
+        survey.coarser / max(survey.passes, 1),
+        cells.area,
+        np.sqrt(np.mean(albedo**2, axis=1)) / np.pi,
+        radiance,
+    )
+    return Light(
+        reflected=indirect.values[:, 0:3],
+        open_sky=indirect.values[:, 3],
+        emitted=indirect.values[:, 4:7],
+        lamps=direct.values[:, 0:3],
+        error=error,
+        cell_error=cell_error,
+        unmeasured=int(np.count_nonzero(~fit.measured)),
+    )
+
+
+def _mean_radiance(survey: Survey, scene: Scene, direct: Fitted, indirect: Fitted) -> float:
+    """Mean over the receivers and the channels of the radiance, W/(m^2 sr)."""
+    receivers = survey.receivers
+    cells = receivers.cells
+    corner = receivers.corner_vertex[cells.element]
+    grey = (direct.values[:, -1] + indirect.values[:, -1])[corner].mean(axis=1)
+    albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])[cells.surface]
+    emission = np.array([np.mean(s.emission) for s in scene.surfaces])[cells.surface]
+    return float(cells.area @ (emission + albedo * grey / np.pi) / cells.area.sum())

@@ -1,0 +1,86 @@
+"""What a bake says of itself afterwards."""
+
+from __future__ import annotations
+
+import sys
+
+from .clock import Clock
+from .patches import Patches
+from .plan import Plan
+from .refinement import Light
+from .result import BakedObject, Report
+from .scene import Scene
+from .settings import Settings
+from .survey import Survey
+from .transport import Transport
+
+
+def make_report(
+    scene: Scene,
+    settings: Settings,
+    plan: Plan,
+    clock: Clock,
+    threads: int,
+    patches: Patches,
+    halves: tuple[Transport, ...],
+    survey: Survey,
+    light: Light,
+    objects: tuple[BakedObject, ...],
+) -> Report:
+    """The report.json of the headless contract; reading and writing Blender's data add their own seconds."""
+    rays = dict(survey.rays)
+    for half in halves:
+        for purpose, count in half.rays.items():
+            rays[purpose] = rays.get(purpose, 0) + count
+    return Report(
+        seconds={"total": clock.elapsed, **clock.seconds},
+        patches=len(patches),
+        rays={"total": sum(rays.values()), **rays},
+        iterations=max((h.solution.iterations for h in halves), default=0),
+        threads=threads,
+        estimated_error=light.error.as_dict(),
+        energy=_mean_energy(halves),
+        effects=list(plan.effects),
+        objects=[
+            {"name": o.name, "attribute": "", "triangles": len(o.triangles), "corners": 3 * len(o.triangles)}
+            for o in objects
+        ],
+        peak_memory_mb=peak_memory_mb(),
+        warnings=[*scene.warnings, *_warnings(settings, light)],
+    )
+
+
+def _mean_energy(halves: tuple[Transport, ...]) -> dict[str, float]:
+    ledgers = [half.energy() for half in halves]
+    names = ("emitted", "absorbed", "escaped", "residual")
+    return {name: sum(ledger[name] for ledger in ledgers) / max(len(ledgers), 1) for name in names}
+
+
+def _warnings(settings: Settings, light: Light) -> list[str]:
+    warnings = []
+    if settings.error is not None and light.error.total > 1.1 * settings.error:
+        cause = max(("sampling", "transport", "resolution"), key=lambda name: getattr(light.error, name))
+        remedy = {
+            "sampling": "allow more time",
+            "transport": "ask for a smaller error, which makes the patches finer",
+            "resolution": "use smaller triangles",
+        }[cause]
+        warnings.append(
+            f"The estimated error is {light.error.total:.1%}, more than the {settings.error:.1%} asked for; most of it "
+            f"is {cause}: {remedy}."
+        )
+    if light.unmeasured:
+        warnings.append(
+            f"{light.unmeasured} vertices lie inside solid objects; they were filled from their neighbours."
+        )
+    return warnings
+
+
+def peak_memory_mb() -> float:
+    """The most memory this process has held so far, in MB; 0 where the system does not tell."""
+    try:
+        import resource  # noqa: PLC0415 - Windows has no such module
+    except ImportError:
+        return 0.0
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return peak / (1e6 if sys.platform == "darwin" else 1e3)
