@@ -128,7 +128,7 @@ def test_is_reciprocal_without_balancing() -> None:
 
 
 def test_box_in_a_room_neither_loses_nor_gains_light() -> None:
-    """Rows are 1 up to the sampled visibility: a pair that is half hidden and has 4 rays errs by a quarter of itself,
+    """Rows are 1 up to the sampled visibility: a pair that is half hidden and has 1 ray errs by half of itself,
     but a row has a hundred such pairs and the room hundreds of rows."""
     found = estimate(room(), box(), wanted=400)
     sums = found.rows.row_sums()
