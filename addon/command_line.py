@@ -1,4 +1,4 @@
-"""What the command line can do: bake a file."""
+"""What the command line can do: bake a file, or say what baking it would take."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from typing import NoReturn
 
 import bpy
 
+from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import Report
 from ..core.scene import SceneError
@@ -24,7 +25,7 @@ from ..core.settings import LAYERS, Settings
 from . import wording
 from .bake_scene import bake_objects
 from .preview import render_preview
-from .scene_reader import pick_receivers
+from .scene_reader import pick_receivers, read_scene
 
 SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
 
@@ -98,6 +99,21 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
         if options.output.exists() and options.output.samefile(source):
             shutil.copy2(source, f"{source}1")  # Blender's own habit when it saves over a file
     _say_what_was_done(result.report, quiet=options.quiet)
+
+
+def _plan(options: argparse.Namespace, progress: Progress) -> None:
+    """Say which effects a bake would simulate and why, and what it would cost."""
+    _open(options.input)
+    receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
+    settings = _settings(options)
+    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
+    progress.check()
+    outlook = plan(scene, settings)
+    for effect in outlook.effects:
+        print(f"{'on ' if effect.active else 'off'}  {effect.name}: {effect.reason}")
+    for warning in scene.warnings:
+        print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
+    print(f"About {outlook.seconds:.1f} s and {outlook.memory_mb:,.0f} MB.")
 
 
 def _say_what_was_done(report: Report, *, quiet: bool) -> None:
@@ -215,6 +231,9 @@ def _parser() -> argparse.ArgumentParser:
     bake.add_argument("--attribute", default="Radiosity", help="name of the colour attribute (Radiosity)")
     bake.add_argument("--report", type=_file(""), metavar="FILE.json", help="write what was done and how well")
     bake.add_argument("--preview", type=_file(".png"), metavar="FILE.png", help="render a picture of the baked objects")
+    outlook = commands.add_parser("plan", help="what a bake would simulate and cost", description=_plan.__doc__)
+    _add_scene_arguments(outlook)
+    outlook.set_defaults(command=_plan)
     return parser
 
 
@@ -235,7 +254,7 @@ def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
         default="new",
         help="light the mesh's own corners, tessellate the mesh, or (the default) add a tessellated copy",
     )
-    layers = f"any of {', '.join(LAYERS)} (combined)"
+    layers = f"besides combined, any of {', '.join(layer for layer in LAYERS if layer != 'combined')}"
     parser.add_argument("--layers", type=_layers, default=Settings.layers, metavar="A,B", help=layers)
     parser.add_argument("--quiet", action="store_true", help="print problems only")
 
@@ -259,7 +278,7 @@ def _layers(text: str) -> tuple[str, ...]:
     for name in names:
         if name not in LAYERS:
             raise argparse.ArgumentTypeError(f"unknown layer '{name}': choose from {', '.join(LAYERS)}")
-    return tuple(names)
+    return tuple(layer for layer in LAYERS if layer == "combined" or layer in names)
 
 
 def _positive(text: str) -> float:
