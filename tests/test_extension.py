@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import platform
 import subprocess
@@ -84,8 +85,9 @@ def test_the_installed_package_bakes(root: Path, packages: dict[str, Path], bare
     user = Path(bare_environment["BLENDER_USER_RESOURCES"]).resolve()
     assert Path(seen["embreex"]).resolve().is_relative_to(user)
     assert seen["package"] == "bl_ext.user_default.radiosity_baker"
-    # A lamp of 100 W two metres above a grey floor gives 0.8 * 100 / (4 pi * 2^2) / pi = 0.51 straight below it.
-    assert 0.1 < seen["brightest"] < 0.6
-    assert seen["darkest"] > 0.0
+    # 0.8 * 100 / (4 pi^2) * 2 / r^3 with r = 2 below the lamp and sqrt(12) at a corner, within what 500 triangles show.
+    light = 0.8 * 100 / (4 * math.pi**2) * 2
+    assert seen["brightest"] == pytest.approx(light / 2**3, rel=0.05)
+    assert seen["darkest"] == pytest.approx(light / 12**1.5, rel=0.05)
     assert seen["headless"] == 0
     assert seen["registered_after_disabling"] is False
