@@ -98,7 +98,7 @@ BOOK_COLOURS: list[Colour] = [
 
 
 def build() -> None:
-    scene = new_scene(world_colour=(0.52, 0.72, 1.0), world_strength=4.0)
+    scene = new_scene(world_colour=(0.52, 0.72, 1.0), world_strength=4.5)
     scene.render.resolution_x, scene.render.resolution_y = 1200, 800
     show(scene, "Standard")
     paint = {name: diffuse(name, colour) for name, colour in PALETTE.items()}
@@ -127,7 +127,7 @@ def build() -> None:
     ]
     add_mesh("Facade", facade(paint["Facade"]))
 
-    sun_lamp("Sun", 16.0, (1.0, 0.84, 0.64), at=(8.0, 2.35, 3.3), target=(2.6, 2.05, 0.0), angle=1.5)
+    sun_lamp("Sun", 12.0, (1.0, 0.84, 0.64), at=(8.0, 2.35, 3.3), target=(2.6, 2.05, 0.0), angle=1.5)
     point_lamp("Lamp", 34.0, (1.0, 0.70, 0.40), at=(4.72, 3.68, 1.5), radius=0.04)
     add_camera(at=(0.34, 0.28, 1.42), target=(3.06, 3.3, 0.98), focal_length=20.5)
     save(Path(__file__).with_name("living_room.blend"), receivers)
