@@ -171,7 +171,7 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
 def _replace_mesh(_: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
     old = obj.data
     name = old.name
-    _set_mesh(obj, mesh)
+    obj.data = mesh
     if old.users == 0:
         bpy.data.meshes.remove(old)
         mesh.name = name
@@ -197,7 +197,7 @@ def _new_copy(context: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types
     copy.modifiers.clear()
     copy.instance_type = "NONE"
     copy[ORIGINAL_KEY] = obj
-    _set_mesh(copy, mesh)
+    copy.data = mesh
     children = context.scene.collection.children
     collection = next((child for child in children if child.name.startswith(COPIES_COLLECTION)), None)
     if collection is None:
@@ -205,16 +205,6 @@ def _new_copy(context: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types
         children.link(collection)
     collection.objects.link(copy)
     return copy
-
-
-def _set_mesh(obj: bpy.types.Object, mesh: bpy.types.Mesh) -> None:
-    """Swap the mesh; materials that the object itself holds stay."""
-    links = [(slot.link, slot.material) for slot in obj.material_slots]
-    obj.data = mesh
-    for slot, (link, material) in zip(obj.material_slots, links, strict=False):
-        if link == "OBJECT":
-            slot.link = link
-            slot.material = material
 
 
 def _show_instead(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object, copy: bpy.types.Object) -> None:

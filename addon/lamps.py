@@ -73,7 +73,7 @@ def _sun(name: str, lamp: bpy.types.SunLight, matrix: Float64, strength: Float64
         name,
         direction=_vector(-matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])),
         irradiance=_rgb(strength),
-        angle=min(lamp.angle, math.pi),  # Cycles widens no further: at 180 degrees the disc is the hemisphere.
+        angle=lamp.angle,
     )
 
 

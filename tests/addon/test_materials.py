@@ -144,6 +144,16 @@ def test_a_muted_shader_passes_its_first_input_on(add_material, shader, under_wh
     np.testing.assert_allclose(np.add(surface.albedo, surface.emission), under_white_sky(material), atol=1e-3)
 
 
+def test_a_muted_link_is_no_link(add_material):
+    material = add_material("ShaderNodeEmission", Strength=2.0)
+    (value,) = chain(material, "ShaderNodeValue")
+    emission = next(node for node in material.node_tree.nodes if node.bl_idname == "ShaderNodeEmission")
+    value.outputs[0].default_value = 5.0
+    material.node_tree.links.new(value.outputs[0], emission.inputs["Strength"]).is_muted = True
+
+    assert read_material(material)[0].emission == (2.0, 2.0, 2.0)
+
+
 def test_a_texture_is_named_and_the_plain_value_taken(add_material):
     material = add_material("ShaderNodeBsdfDiffuse", name="Bricks", Color=COLOUR)
     (texture,) = chain(material, "ShaderNodeTexChecker")
