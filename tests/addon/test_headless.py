@@ -117,7 +117,7 @@ def test_report_and_preview_come_beside_it(scene_file: Path, out: Path, capsys):
 def subprocess_version() -> str:
     """What `radiosity-baker --version` prints, by the console script of this environment."""
     script = Path(sys.executable).parent / "radiosity-baker"
-    return subprocess.run([str(script), "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    return subprocess.run([str(script), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[-1]
 
 
 @pytest.mark.usefixtures("painted")
@@ -240,6 +240,7 @@ def _edit(path: Path, change) -> None:
         (nothing, ["--threads", "-1"], ["-1"]),
         (nothing, ["--result", "maybe"], ["maybe", "replace"]),
     ],
+    ids=lambda case: " ".join([case[0].__name__, *case[1]]),
 )
 def test_unusable_input_is_named_with_a_remedy_and_nothing_is_written(scene_file: Path, out: Path, capsys, case):
     spoil, more, said = case
