@@ -1,18 +1,21 @@
-"""The operators: one bake with two drivers, and its cancel button.
+"""The operators: one bake with two drivers, its cancel button, and its plan.
 
 From a script or in background `execute` blocks until the light is baked. In a window `invoke` reads the scene, leaves
 the bake to a worker thread and looks in ten times a second; all that the bake writes is written in the last of these
 ticks, so a cancelled bake has touched nothing, and one undo step takes a finished one back.
 """
 
+import json
 import time
 import traceback
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
@@ -33,19 +36,13 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        if BakeJob.running is not None:
-            cls.poll_message_set("A bake is already running")
-            return False
-        if context.mode != "OBJECT":
-            cls.poll_message_set("Switch to Object Mode to bake")
-            return False
-        return True
+        return _can_bake(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return self._attempt(lambda: self._bake_at_once(context))
+        return _attempt(self, lambda: self._bake_at_once(context))
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
-        return self._attempt(lambda: self._start(context))
+        return _attempt(self, lambda: self._start(context))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if event.type == "ESC" and event.value == "PRESS":
@@ -57,7 +54,7 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         panels.redraw(context)
         if not self._job.poll() or not (self._job.cancelling or _can_write(context)):
             return {"PASS_THROUGH"}
-        outcome = self._attempt(lambda: self._finish(context))
+        outcome = _attempt(self, lambda: self._finish(context))
         self._leave()
         return outcome
 
@@ -129,18 +126,57 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
             self.report({"WARNING"}, warning)
         self.report({"INFO"}, wording.summary(result.report.as_dict()))
 
-    def _attempt(self, action: Callable[[], set[str] | None]) -> set[str]:
-        """Do it; whatever goes wrong reaches the person, and what is not their doing reaches the console too."""
-        try:
-            return action() or {"FINISHED"}
-        except Cancelled:
-            self.report({"INFO"}, "Bake cancelled, nothing was changed")
-        except SceneError as problem:
-            self.report({"ERROR"}, str(problem))
-        except Exception as problem:  # noqa: BLE001 - nothing a bake throws may vanish
-            traceback.print_exc()
-            self.report({"ERROR"}, f"The bake failed, see the console for details. {type(problem).__name__}: {problem}")
-        return {"CANCELLED"}
+
+class OBJECT_OT_radiosity_plan(bpy.types.Operator):
+    bl_idname = "object.radiosity_plan"
+    bl_label = "Plan Bake"
+    bl_description = "Find out which effects of light this scene calls for, and what the bake would cost"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_bake(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        return _attempt(self, lambda: self._plan(context))
+
+    def _plan(self, context: bpy.types.Context) -> None:
+        asked = context.scene.radiosity_baker
+        settings = asked.to_core()
+        receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
+        scene, _ = scene_reader.read_scene(context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
+        planned = plan(scene, settings)
+        asked.plan = json.dumps(
+            {
+                "seconds": planned.seconds,
+                "memory_mb": planned.memory_mb,
+                "effects": [asdict(effect) for effect in planned.effects],
+            }
+        )
+
+
+def _attempt(operator: bpy.types.Operator, action: Callable[[], set[str] | None]) -> set[str]:
+    """Do it; whatever goes wrong reaches the person, and what is not their doing reaches the console too."""
+    try:
+        return action() or {"FINISHED"}
+    except Cancelled:
+        operator.report({"INFO"}, "Bake cancelled, nothing was changed")
+    except SceneError as problem:
+        operator.report({"ERROR"}, str(problem))
+    except Exception as problem:  # noqa: BLE001 - nothing a bake throws may vanish
+        traceback.print_exc()
+        operator.report({"ERROR"}, f"The bake failed, see the console for details. {type(problem).__name__}: {problem}")
+    return {"CANCELLED"}
+
+
+def _can_bake(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
+    if BakeJob.running is not None:
+        operator.poll_message_set("A bake is already running")
+        return False
+    if not _can_write(context):
+        operator.poll_message_set("Switch to Object Mode to bake")
+        return False
+    return True
 
 
 _timers: list[bpy.types.Timer] = []
@@ -192,6 +228,7 @@ def _stop_bake(*_: object) -> None:
 def register() -> None:
     bpy.utils.register_class(OBJECT_OT_radiosity_bake)
     bpy.utils.register_class(OBJECT_OT_radiosity_cancel)
+    bpy.utils.register_class(OBJECT_OT_radiosity_plan)
     bpy.types.VIEW3D_MT_object.append(_draw_menu)
     bpy.app.handlers.load_pre.append(_stop_bake)
 
@@ -200,5 +237,6 @@ def unregister() -> None:
     _stop_bake()
     bpy.app.handlers.load_pre.remove(_stop_bake)
     bpy.types.VIEW3D_MT_object.remove(_draw_menu)
+    bpy.utils.unregister_class(OBJECT_OT_radiosity_plan)
     bpy.utils.unregister_class(OBJECT_OT_radiosity_cancel)
     bpy.utils.unregister_class(OBJECT_OT_radiosity_bake)

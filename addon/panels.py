@@ -11,7 +11,7 @@ import bpy
 
 from . import viewport
 from .job import BakeJob
-from .wording import clock, count, energy_line, error_causes, percent
+from .wording import count, energy_line, error_causes, percent, stage, time_line
 
 #: Where the panel appears, and what Blender wants to know about each place.
 PLACES = {
@@ -85,18 +85,19 @@ class LastBakeSection:
             _label(layout.column(align=True), context, warning, icon="ERROR")
 
 
-class EffectsSection:
-    bl_label = "Effects"
+class PlanSection:
+    bl_label = "Plan"
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        report = context.scene.radiosity_baker.last_report()
-        return report is not None and bool(report["effects"])
-
     def draw(self, context: bpy.types.Context) -> None:
-        for effect in context.scene.radiosity_baker.last_report()["effects"]:
-            column = self.layout.column(align=True)
+        layout, plan = self.layout, context.scene.radiosity_baker.last_plan()
+        layout.operator("object.radiosity_plan", icon="VIEWZOOM")
+        if "seconds" in plan:
+            column = layout.column(align=True)
+            _figure(column, "Time", f"About {plan['seconds']:.1f} s")
+            _figure(column, "Memory", f"About {plan['memory_mb']:,.0f} MB")
+        for effect in plan.get("effects", ()):
+            column = layout.column(align=True)
             column.active = effect["active"]
             name = effect["name"].replace("_", " ").capitalize()
             column.label(text=name, icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT")
@@ -137,13 +138,12 @@ def _what_is_baked(context: bpy.types.Context) -> str:
 
 
 def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:
+    """As high as the button and the label it stands in for, so that nothing below it moves."""
     row = layout.row(align=True)
     row.scale_y = 1.5
-    row.progress(factor=job.progress.fraction, text=_stage(job))
+    row.progress(factor=job.progress.fraction, text=stage(job))
     row.operator("object.radiosity_cancel", icon="X", text="")
-    column = layout.column(align=True)
-    for text in _figures(job):
-        column.label(text=text)
+    layout.label(text=time_line(job), icon="TIME")
 
 
 def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
@@ -157,25 +157,9 @@ def _draw_status(header: bpy.types.Header, _context: bpy.types.Context) -> None:
     layout.separator_spacer()
     bar = layout.row()
     bar.ui_units_x = 16
-    bar.progress(factor=job.progress.fraction, text=_stage(job))
-    layout.label(text="   ".join(_figures(job)))
+    bar.progress(factor=job.progress.fraction, text=stage(job))
+    layout.label(text=time_line(job))
     layout.separator_spacer()
-
-
-def _stage(job: BakeJob) -> str:
-    if job.cancelling:
-        return "Cancelling"
-    if job.poll():
-        return "Waiting for Object Mode"
-    return f"{job.progress.stage.capitalize() or 'Starting'} {100.0 * job.progress.fraction:.0f} %"
-
-
-def _figures(job: BakeJob) -> list[str]:
-    time = f"{clock(job.elapsed)} so far"
-    if job.remaining is not None:
-        time += f", about {clock(job.remaining)} left"
-    error = job.progress.error
-    return [time, "No estimate of the error yet" if error is None else f"Estimated error {percent(error)}"]
 
 
 def _figure(layout: bpy.types.UILayout, name: str, value: str, *, active: bool = True) -> None:
@@ -201,7 +185,7 @@ def _panels() -> list[type]:
     made = []
     for place, where in PLACES.items():
         main = f"{place}_PT_radiosity"
-        for section in (BakeSection, LastBakeSection, EffectsSection, AdvancedSection):
+        for section in (BakeSection, LastBakeSection, PlanSection, AdvancedSection):
             name = main if section is BakeSection else f"{main}_{section.__name__.removesuffix('Section').lower()}"
             about = dict(where, bl_idname=name)
             if section is not BakeSection:

@@ -165,6 +165,12 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
     )
 
+    plan: StringProperty(
+        name="Plan",
+        description="What the next bake would simulate, and what it would cost",
+        options={"HIDDEN"},
+    )
+
     def to_core(self) -> core.Settings:
         """The settings as `core.bake` takes them: lengths in metres, errors as a share of one."""
         return core.Settings(
@@ -186,11 +192,16 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
     def remember(self, report: dict[str, Any]) -> None:
         """Keep a bake's report with the scene, where undo and saving take it along."""
         self.report = json.dumps(report)
+        self.plan = ""
         self.layer = "combined"
 
     def last_report(self) -> dict[str, Any] | None:
         """The report of the last bake, or None before the first."""
         return _parsed(self.report) if self.report else None
+
+    def last_plan(self) -> dict[str, Any]:
+        """The plan made since the last bake, or else what that bake simulated; empty before either."""
+        return _parsed(self.plan or self.report or "{}")
 
 
 @lru_cache(maxsize=4)

@@ -13,7 +13,6 @@ from bpy.props import StringProperty
 from ..core.settings import LAYERS
 from .attribute_writer import attribute_name
 
-#: The type comes first: the other choices depend on it.
 BAKED_LOOK = {
     "type": "SOLID",
     "color_type": "VERTEX",
@@ -56,7 +55,7 @@ def restore(area: bpy.types.Area) -> None:
     """Give a 3D View back the look it had before `show`."""
     kept = _kept(area.id_data)
     before = kept.pop(_key(area))
-    for name, value in reversed(before.items()):
+    for name, value in before.items():
         setattr(area.spaces.active.shading, name, value)
     area.id_data.radiosity_baker_looks = json.dumps(kept)
 

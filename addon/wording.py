@@ -1,9 +1,11 @@
-"""What a bake did, in words: for the panel, the status bar and the command line.
+"""What a bake does and did, in words: for the panel, the status bar and the command line.
 
-Each function takes a report as `core.result.Report.as_dict` gives it.
+A report is what `core.result.Report.as_dict` gives.
 """
 
 from typing import Any
+
+from .job import BakeJob
 
 
 def summary(report: dict[str, Any]) -> str:
@@ -39,10 +41,26 @@ def energy_line(report: dict[str, Any]) -> str:
     energy = report["energy"]
     if not energy.get("emitted"):
         return ""
-    emitted, absorbed, escaped, residual = (
-        watts(energy[name]) for name in ("emitted", "absorbed", "escaped", "residual")
-    )
-    return f"Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {residual} are not accounted for"
+    emitted, absorbed, escaped = (watts(energy[name]) for name in ("emitted", "absorbed", "escaped"))
+    lost = abs(energy["residual"]) / energy["emitted"]
+    unaccounted = percent(lost) if lost >= 0.0005 else "less than 0.1 %"
+    return f"Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {unaccounted} is not accounted for"
+
+
+def stage(job: BakeJob) -> str:
+    """Where a running bake is, short enough for a bar in a narrow panel."""
+    if job.cancelling:
+        return "Cancelling"
+    if job.poll():
+        return "Waiting for Object Mode"
+    progress = job.progress
+    done = f"{progress.stage.capitalize() or 'Starting'} {100.0 * progress.fraction:.0f} %"
+    return done if progress.error is None else f"{done}, error {percent(progress.error)}"
+
+
+def time_line(job: BakeJob) -> str:
+    so_far = f"{clock(job.elapsed)} so far"
+    return so_far if job.remaining is None else f"{so_far}, about {clock(job.remaining)} left"
 
 
 def count(noun: str, number: int) -> str:

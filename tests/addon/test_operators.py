@@ -73,6 +73,18 @@ def test_bakes_what_was_asked_for(room, stand_in):
 
 
 @pytest.mark.usefixtures("room")
+def test_plan_tells_effects_and_cost_and_bakes_nothing():
+    objects = bpy.data.objects.keys()
+    assert bpy.ops.object.radiosity_plan() == {"FINISHED"}
+    plan = bpy.context.scene.radiosity_baker.last_plan()
+    assert plan["seconds"] > 0.0
+    assert plan["memory_mb"] > 0.0
+    assert {effect["name"]: effect["active"] for effect in plan["effects"]}["point lamps"]
+    assert bpy.data.objects.keys() == objects
+    assert bpy.context.scene.radiosity_baker.last_report() is None
+
+
+@pytest.mark.usefixtures("room")
 def test_invoked_without_a_window_it_blocks(stand_in):
     stand_in()
     assert bpy.ops.object.radiosity_bake("INVOKE_DEFAULT") == {"FINISHED"}

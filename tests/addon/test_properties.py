@@ -73,5 +73,13 @@ def test_every_setting_has_a_tooltip(asked):
 
 def test_report_stays_with_the_scene(asked):
     assert asked.last_report() is None
-    asked.remember({"objects": [], "seconds": {"total": 1.5}})
-    assert asked.last_report()["seconds"]["total"] == 1.5
+    asked.remember({"objects": [], "warnings": ["Dim"]})
+    assert asked.last_report()["warnings"] == ["Dim"]
+
+
+def test_plan_is_shown_until_a_bake_is_done(asked):
+    assert asked.last_plan() == {}
+    asked.plan = '{"seconds": 3.0}'
+    assert asked.last_plan() == {"seconds": 3.0}
+    asked.remember({"objects": [], "effects": []})
+    assert asked.last_plan()["effects"] == []

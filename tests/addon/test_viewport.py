@@ -42,12 +42,14 @@ def test_restore_brings_the_old_look_back(view, kind):
 def test_each_view_has_its_own_look(view):
     other = next(area for area in view.id_data.areas if area != view)
     other.type = "VIEW_3D"
+    looks = look(view), look(other)
     viewport.show(view)
-    assert look(other) != viewport.BAKED_LOOK
+    assert look(other) == looks[1]
     viewport.show(other)
     viewport.restore(view)
-    assert look(view) != viewport.BAKED_LOOK
-    assert look(other) == viewport.BAKED_LOOK
+    assert (look(view), look(other)) == (looks[0], viewport.BAKED_LOOK)
+    viewport.restore(other)
+    assert look(other) == looks[1]
 
 
 def test_layer_switch_leaves_the_exported_layer_alone(add_mesh):

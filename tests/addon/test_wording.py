@@ -1,5 +1,9 @@
 """What the panel and the command line say of a bake."""
 
+from types import SimpleNamespace
+
+import pytest
+
 from radiosity_baker.addon import wording
 
 REPORT = {
@@ -20,7 +24,33 @@ def test_error_names_its_causes():
 
 def test_ledger_in_words():
     line = wording.energy_line(REPORT).replace("\N{NO-BREAK SPACE}", " ")
-    assert line == "Of 10 W given off, 9.1 W were absorbed and 0.9 W escaped; 0.0001 W are not accounted for"
+    assert line == "Of 10 W given off, 9.1 W were absorbed and 0.9 W escaped; less than 0.1 % is not accounted for"
+
+
+def test_ledger_that_does_not_close_says_so():
+    leak = REPORT | {"energy": {"emitted": 10.0, "absorbed": 8.0, "escaped": 0.9, "residual": -1.1}}
+    assert wording.energy_line(leak).endswith("; 11.0 % is not accounted for")
+
+
+@pytest.mark.parametrize(
+    ("job", "said"),
+    [
+        ({}, "Starting 0 %"),
+        ({"stage": "gather", "fraction": 0.434}, "Gather 43 %"),
+        ({"stage": "gather", "fraction": 0.5, "error": 0.0213}, "Gather 50 %, error 2.1 %"),
+        ({"stage": "gather", "cancelling": True}, "Cancelling"),
+        ({"stage": "layers", "ended": True}, "Waiting for Object Mode"),
+    ],
+)
+def test_stage_of_a_running_bake(job, said):
+    progress = SimpleNamespace(**{"stage": "", "fraction": 0.0, "error": None} | job)
+    running = SimpleNamespace(progress=progress, cancelling="cancelling" in job, poll=lambda: "ended" in job)
+    assert wording.stage(running) == said
+
+
+def test_time_left_is_told_once_it_is_known():
+    assert wording.time_line(SimpleNamespace(elapsed=2.0, remaining=None)) == "0:02 so far"
+    assert wording.time_line(SimpleNamespace(elapsed=2.0, remaining=63.0)) == "0:02 so far, about 1:03 left"
 
 
 def test_nothing_is_said_of_what_is_not_known():
