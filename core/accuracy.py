@@ -55,21 +55,15 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:
     last channel, the mean of all light. area (c,) of the cells."""
     grey = [half.channel(-1) for half in halves]
     systems = [fit.system(half) for half in grey]
-    best: tuple[float, float, tuple[Float64, Float64], Float64] | None = None
-    start: list[Float64 | None] = [None, None]
-    for alpha in ALPHAS:
-        values = [fit.solve(system, alpha, begin) for system, begin in zip(systems, start, strict=True)]
-        start = list(values)
-        corners = [fit.at_corners(v) for v in values]
-        residual = (grey[0].squared_residual(corners[1]) + grey[1].squared_residual(corners[0]))[:, 0] / 2
-        score = float(area @ residual)
-        if best is not None and score > best[0]:
+    lowest, alpha = np.inf, ALPHAS[0]
+    residual = spread = np.zeros(len(area))
+    for candidate in ALPHAS:
+        first, second = (fit.at_corners(fit.solve(system, candidate)) for system in systems)
+        predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first))[:, 0] / 2
+        score = float(area @ predicted)
+        if score > lowest:
             break
-        best = (score, alpha, (values[0], values[1]), residual)
-    assert best is not None
-    _, alpha, values, residual = best
-    corners = fit.at_corners(values[0] - values[1])
-    spread = squared_mean(corners)[:, 0]
+        lowest, alpha, residual, spread = score, candidate, predicted, squared_mean(first - second)[:, 0]
     count = np.maximum(grey[0].count + grey[1].count, 1.0)
     own_noise = (grey[0].noise + grey[1].noise)[:, 0] / count
     merged = fit.system(halves[0] + halves[1])

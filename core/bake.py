@@ -6,6 +6,7 @@ import numpy as np
 
 from .check import check_scene
 from .clock import Clock
+from .contacts import refine_contacts
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight
 from .direct.lamps import place
@@ -46,9 +47,11 @@ def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> 
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
-        surroundings = look_up(patches, visibility, halves, effort, settings.seed)
-        survey = Survey(receivers, direct_light, surroundings, sky, effort, settings.seed, workers)
-        light = refine(survey, scene, settings, effort, clock)
+        surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
+        with clock.stage("tessellate", 0.28):
+            receivers = refine_contacts(receivers, surroundings, direct_light, settings.seed, workers)
+        survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
+        light = refine(survey, scene, settings, effort, workers, clock)
     with clock.stage("layers", 0.97):
         objects = tuple(baked_objects(scene, receivers, light, settings.layers))
     return BakeResult(

@@ -44,9 +44,11 @@ def gather_indirect(
     def work(chunk: int, part: slice) -> tuple[Float64, Float64, Bool]:
         rng = stream(seed, f"gather {number}", chunk)
         code = hemispheres.cast(points.positions[part], points.normals[part], points.shading[part], rng)
-        halves = [column[code].reshape(len(code), 2, -1).mean(axis=2, dtype=np.float64) for column in columns]
-        irradiance = np.stack([h.mean(axis=1) for h in halves], axis=1)
-        variance = np.stack([(h[:, 0] - h[:, 1]) ** 2 / 4.0 for h in halves], axis=1)
+        flat, rays = code.ravel(), code.shape[1] // 2
+        halves = np.stack([np.add.reduce(column[flat].reshape(-1, rays), axis=1) for column in columns], axis=1)
+        halves = halves.reshape(len(code), 2, -1).astype(np.float64) / rays
+        irradiance = (halves[:, 0] + halves[:, 1]) / 2.0
+        variance = (halves[:, 0] - halves[:, 1]) ** 2 / 4.0
         behind = ((code >= codes.triangles) & (code < codes.escaped)).mean(axis=1)
         return irradiance, variance, behind > _ENCLOSED
 

@@ -5,6 +5,7 @@ Both the transport rows and the final gather are made of these; they differ only
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,11 +43,20 @@ class Hemispheres:
     """
 
     def __init__(self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator) -> None:
-        self.rays = rays
         self.codes = Codes(len(patches.normals))
-        self.chunk = max(1, CHUNK_RAYS // rays)
         self._visibility = visibility
         self._normals = patches.normals.astype(np.float32)
+        self._choose(rays, rng)
+
+    def with_rays(self, rays: int, rng: np.random.Generator) -> Hemispheres:
+        """The same surroundings, looked at with another number of rays."""
+        other = copy(self)
+        other._choose(rays, rng)  # noqa: SLF001 - a copy of itself
+        return other
+
+    def _choose(self, rays: int, rng: np.random.Generator) -> None:
+        self.rays = rays
+        self.chunk = max(1, CHUNK_RAYS // rays)
         half = rays // 2
         self._patterns = np.concatenate(
             [cosine_patterns(_PATTERNS, half, rng), cosine_patterns(_PATTERNS, rays - half, rng)], axis=1

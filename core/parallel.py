@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Self, TypeVar
 
 from .progress import Progress
 
@@ -28,7 +28,7 @@ class Workers:
         self.progress = progress
         self._pool = ThreadPoolExecutor(self.threads, "radiosity")
 
-    def __enter__(self) -> Workers:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

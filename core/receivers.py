@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .patches import Cells, Space, shading_normals, triangle_geometry
-from .scene import Float64, Int32, Scene, SceneObject
+from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
-from .tessellation import Tessellation, edge_for_count, triform, whole
+from .tessellation import Int64, Tessellation, edge_for_count, split_triangles, triform, whole
 
 #: Corners whose shading normals differ by less than this angle (cosine) share one value.
 _SAME_NORMAL = np.cos(np.radians(5.0))
@@ -17,15 +17,18 @@ _SAME_NORMAL = np.cos(np.radians(5.0))
 
 @dataclass(frozen=True, eq=False)
 class Receivers:
-    """The output meshes of the receivers, and the cells on all of them.
+    """The output meshes of the receivers, and the cells on all of them: the triangles of the fine meshes, which are the
+    output meshes unless the input's own triangles are kept.
 
     first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
-    the unit box, element_surface (e,) into Scene.surfaces, corner_vertex (e, 3) the fit vertex of each of their corners;
-    vertices: how many fit vertices there are.
+    the unit box, element_surface (e,) into Scene.surfaces, corner_vertex (e, 3) the fit vertex of each of their
+    corners; vertices: how many fit vertices there are.
     """
 
+    space: Space
     objects: tuple[SceneObject, ...]
     meshes: tuple[Tessellation, ...]
+    fine: tuple[Tessellation, ...]
     cells: Cells
     first: Int32
     element_corners: Float64
@@ -40,9 +43,15 @@ def make_receivers(scene: Scene, space: Space, settings: Settings) -> Receivers:
     Where the mesh is to be kept, the output has the input's triangles, and only the sampling is as fine as that.
     """
     objects = scene.receivers()
-    tessellate, size, triangles = settings.tessellate, settings.size, settings.triangles
-    edge = size or edge_for_count([o.vertices for o in objects], [o.triangles for o in objects], triangles)
+    edge = settings.size or edge_for_count(
+        [o.vertices for o in objects], [o.triangles for o in objects], settings.triangles
+    )
     fine = [triform(whole(o.vertices, o.triangles), edge) for o in objects]
+    return lay_out(objects, fine, space, tessellate=settings.tessellate)
+
+
+def lay_out(objects: tuple[SceneObject, ...], fine: list[Tessellation], space: Space, *, tessellate: bool) -> Receivers:
+    """Cells on the triangles of the fine meshes, which become the output as well if `tessellate`."""
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]
     first = np.concatenate([[0], np.cumsum([len(m.triangles) for m in meshes])]).astype(np.int32)
 
@@ -76,8 +85,10 @@ def make_receivers(scene: Scene, space: Space, settings: Settings) -> Receivers:
         corner_vertex.append(vertex + count)
         count += used
     return Receivers(
+        space=space,
         objects=objects,
         meshes=tuple(meshes),
+        fine=tuple(fine),
         cells=cells,
         first=first,
         element_corners=np.concatenate(element_corners),
@@ -85,6 +96,19 @@ def make_receivers(scene: Scene, space: Space, settings: Settings) -> Receivers:
         corner_vertex=np.concatenate(corner_vertex).astype(np.int32),
         vertices=count,
     )
+
+
+def split_cells(receivers: Receivers, chosen: Bool) -> tuple[Receivers, Int64]:
+    """The receivers with the chosen (c,) cells split into four; and for each new cell the one it came from."""
+    fine, sources, begin = [], [], 0
+    for mesh in receivers.fine:
+        end = begin + len(mesh.triangles)
+        split, source = split_triangles(mesh, chosen[begin:end])
+        fine.append(split)
+        sources.append(source + begin)
+        begin = end
+    tessellate = receivers.meshes == receivers.fine
+    return lay_out(receivers.objects, fine, receivers.space, tessellate=tessellate), np.concatenate(sources)
 
 
 def fit_vertices(triangles: Int32, normals: Float64, surface: Int32) -> tuple[Int32, int]:

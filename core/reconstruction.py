@@ -16,6 +16,8 @@ from .scene import Bool, Float64, Int32
 
 _TOLERANCE = 1e-4
 _MAXIMUM_ITERATIONS = 100
+#: How many rings of vertices around the last measured ones are filled in.
+FILLED_RINGS = 1
 #: Entries of a row of the fit's matrix that are kept in line: more than a vertex of a sound mesh has.
 _WIDTH = 24
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
@@ -48,8 +50,8 @@ class Samples:
 
     def __add__(self, other: Samples) -> Samples:
         total = Samples(self.light.shape[0], self.light.shape[2])
-        for name, value in vars(total).items():
-            value += getattr(self, name) + getattr(other, name)
+        for name in vars(total):
+            setattr(total, name, getattr(self, name) + getattr(other, name))
         return total
 
     def channel(self, k: int) -> Samples:
@@ -98,7 +100,7 @@ class SparseMatrix:
 
 
 class Pattern:
-    """Which entries a sum of triplets fills, found once and used for every set of values. Every row has its diagonal."""
+    """Which entries a sum of triplets fills, found once and used for every set of values; all of the diagonal is."""
 
     def __init__(self, count: int, rows: np.ndarray, columns: np.ndarray) -> None:
         key = np.concatenate([rows.astype(np.int64) * count + columns, np.arange(count) * (count + 1)])
@@ -181,15 +183,16 @@ class Fit:
         return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count)
 
     def fill(self, values: Float64) -> Float64:
-        """Give vertices that no valid sample touched the mean of their neighbours, outward from what is known."""
+        """Give vertices that no valid sample touched the mean of their neighbours, for a few rings from what is known.
+
+        Farther inside a solid the light is what it truly is there: none.
+        """
         known = self.measured.copy()
         corners = self._receivers.corner_vertex
         one, two = corners.ravel(), corners[:, [1, 2, 0]].ravel()
         one, two = np.concatenate([one, two]), np.concatenate([two, one])
-        while not known.all():
+        for _ in range(FILLED_RINGS):
             edge = known[one] & ~known[two]
-            if not edge.any():
-                break
             share = np.bincount(two[edge], minlength=self._count)
             total = [np.bincount(two[edge], v[one[edge]], self._count) for v in values.T]
             fresh = share > 0

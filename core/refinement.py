@@ -10,6 +10,7 @@ import numpy as np
 
 from .accuracy import ErrorEstimate, Fitted, estimate_error, fit_halves
 from .clock import Clock
+from .parallel import Workers
 from .plan import Effort
 from .reconstruction import Fit
 from .scene import Float64, Scene
@@ -38,7 +39,7 @@ class Light:
     unmeasured: int
 
 
-def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, clock: Clock) -> Light:
+def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, workers: Workers, clock: Clock) -> Light:
     """Passes until the estimated error, or the clock, says so."""
     begun = perf_counter()
     with clock.stage("gather", 0.3):
@@ -50,7 +51,7 @@ def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, clo
     for round_number in range(_MOST_ROUNDS):
         begun = perf_counter()
         with clock.stage("fit", 0.75 + 0.05 * round_number):
-            light = fit_light(survey, scene)
+            light = fit_light(survey, scene, workers)
         seconds_to_fit = perf_counter() - begun
         more = _passes_wanted(survey, light.error, settings)
         if settings.seconds is not None:
@@ -64,12 +65,12 @@ def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, clo
             survey.refine_boundaries(more)
     else:
         with clock.stage("fit", 0.95, light.error.total):
-            light = fit_light(survey, scene)
+            light = fit_light(survey, scene, workers)
     return light
 
 
 def _passes_wanted(survey: Survey, error: ErrorEstimate, settings: Settings) -> int:
-    """How many more passes bring sampling down to what is asked, or to where the mesh cannot show it; an even number."""
+    """How many more passes, an even number, bring sampling to what is asked or to where the mesh cannot show it."""
     if settings.error is None:
         return _MOST_PASSES if settings.seconds is not None else 0
     target = max(_SAMPLING_SHARE * settings.error, _RESOLUTION_SHARE * error.resolution)
@@ -77,39 +78,45 @@ def _passes_wanted(survey: Survey, error: ErrorEstimate, settings: Settings) -> 
     return min(2 * ceil((wanted - survey.passes) / 2), _MOST_PASSES)
 
 
-def fit_light(survey: Survey, scene: Scene) -> Light:
-    """Least squares onto the vertices, for indirect and direct light each with the smoothing it needs."""
-    receivers = survey.receivers
+def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
+    """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
+    receivers, around = survey.receivers, survey.surroundings
     cells = receivers.cells
     fit = Fit(receivers, survey.valid_samples)
-    direct = fit_halves(fit, survey.direct, cells.area)
-    indirect = fit_halves(fit, survey.indirect, cells.area)
-    radiance = _mean_radiance(survey, scene, direct, indirect)
+    sampled = [survey.direct, survey.indirect] if around else [survey.direct]
+    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area), len(sampled), 1))
+    dark = np.zeros((receivers.vertices, 3))
+    reflected, open_sky, emitted = dark, dark[:, 0], dark
+    if around:
+        values = fits[1].values
+        reflected = values[:, :3]
+        open_sky = values[:, around.sky].sum(axis=1)
+        emitted = values[:, around.emitted] if around.emitted.stop > around.emitted.start else dark
     albedo = np.array([s.albedo for s in scene.surfaces])[cells.surface]
     error, cell_error = estimate_error(
-        [direct, indirect],
+        fits,
         survey.coarser / max(survey.passes, 1),
         cells.area,
         np.sqrt(np.mean(albedo**2, axis=1)) / np.pi,
-        radiance,
+        _mean_radiance(survey, scene, fits),
     )
     return Light(
-        reflected=indirect.values[:, 0:3],
-        open_sky=indirect.values[:, 3],
-        emitted=indirect.values[:, 4:7],
-        lamps=direct.values[:, 0:3],
+        reflected=reflected,
+        open_sky=open_sky,
+        emitted=emitted,
+        lamps=fits[0].values[:, :3],
         error=error,
         cell_error=cell_error,
         unmeasured=int(np.count_nonzero(~fit.measured)),
     )
 
 
-def _mean_radiance(survey: Survey, scene: Scene, direct: Fitted, indirect: Fitted) -> float:
+def _mean_radiance(survey: Survey, scene: Scene, fits: list[Fitted]) -> float:
     """Mean over the receivers and the channels of the radiance, W/(m^2 sr)."""
     receivers = survey.receivers
     cells = receivers.cells
     corner = receivers.corner_vertex[cells.element]
-    grey = (direct.values[:, -1] + indirect.values[:, -1])[corner].mean(axis=1)
+    grey = np.sum([fitted.values[:, -1] for fitted in fits], axis=0)[corner].mean(axis=1)
     albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])[cells.surface]
     emission = np.array([np.mean(s.emission) for s in scene.surfaces])[cells.surface]
     return float(cells.area @ (emission + albedo * grey / np.pi) / cells.area.sum())

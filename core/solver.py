@@ -105,7 +105,9 @@ def _conjugate_gradients(
     preconditioned = weight * residual
     direction = preconditioned.copy()
     energy = np.sum(residual * preconditioned, axis=0)
-    for iteration in range(1, _MAXIMUM_ITERATIONS + 1):
+    iteration, bound = 0, np.inf
+    while bound > tolerance and iteration < _MAXIMUM_ITERATIONS:
+        iteration += 1
         image = operator(direction)
         step = energy / np.maximum(np.sum(direction * image, axis=0), np.finfo(float).tiny)
         z = z + step * direction
@@ -116,8 +118,6 @@ def _conjugate_gradients(
         energy = fresh
         # One more pass would move the reflected light, root z, by root times the scaled residual.
         bound = _relative(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
-        if bound <= tolerance:
-            break
     irradiance = direct + factors.apply(root * z, workers)
     return Solution(np.maximum(irradiance, 0.0), _WATCHED_PASSES + iteration, bound)
 

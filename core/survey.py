@@ -1,7 +1,7 @@
 """Pass by pass, the samples of light on the receivers that the fit is made from.
 
-Every pass puts one new point into each cell, looks around from it, and adds what arrives. Even passes see the patches as
-one half of the transport rays solved them, odd passes as the other half did: two independent answers to everything.
+Every pass puts one new point into each cell, looks around from it, and adds what arrives. Even passes see the patches
+as one half of the transport rays solved them, odd passes as the other half did: two independent answers to everything.
 """
 
 from __future__ import annotations
@@ -9,10 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight, Illumination
 from .gather import Points, gather_direct, gather_indirect, shadow_boundary
-from .hemisphere import Hemispheres
+from .hemisphere import Codes, Hemispheres
 from .parallel import Workers
 from .patches import Patches
 from .plan import Effort
@@ -25,45 +26,72 @@ from .visibility import Visibility
 
 #: A point that sees only backs, and less than this share of the mean light, is inside a solid.
 _DARK = 0.05
-#: Columns of the tables of what a ray brings, and of the indirect samples: reflected light (3), open sky, light of
-#: emitting surfaces that are not sampled as lamps (3), and last the same reflected light from coarser patches (mean).
-REFLECTED, SKY, EMITTED, COARSER = slice(0, 3), 3, slice(4, 7), 7
-COLUMNS = 8
 
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
-    """What rays from the receivers can bring: tables (codes, COLUMNS) of radiosity by ray code, one for each half."""
+    """What rays from the receivers can bring.
+
+    tables: for each half of the transport (codes, columns) radiosity by ray code. The columns are reflected light (3);
+    if the scene calls for it the open sky (1) and emitting surfaces that are not sampled as lamps (3); and last the
+    mean of the reflected light again, from coarser patches. to_grey (columns - 1,): weights that turn the columns into
+    the mean irradiance of the three channels.
+    """
 
     hemispheres: Hemispheres
-    tables: tuple[Float32, Float32]
+    tables: tuple[Float32, ...]
+    sky: slice
+    emitted: slice
+    to_grey: Float64
 
 
 def look_up(
-    patches: Patches, visibility: Visibility, halves: tuple[Transport, ...], effort: Effort, seed: int
+    patches: Patches,
+    visibility: Visibility,
+    halves: tuple[Transport, ...],
+    sky: Float64,
+    effort: Effort,
+    seed: int,
 ) -> Surroundings | None:
     """Tables of what the solved halves send to a ray, by what it meets; None when nothing was solved."""
     if not halves:
         return None
-    hemispheres = Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"))
-    return Surroundings(hemispheres, (_table(halves[0], patches, effort), _table(halves[1], patches, effort)))
+    seen = int(sky.max() > 0)
+    by_rays = 3 * effort.emitters_by_rays
+    return Surroundings(
+        hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns")),
+        tables=tuple(_table(half, seen > 0, effort.emitters_by_rays) for half in halves),
+        sky=slice(3, 3 + seen),
+        emitted=slice(3 + seen, 3 + seen + by_rays),
+        to_grey=np.concatenate([np.full(3, 1 / 3), np.full(seen, np.pi * sky.mean()), np.full(by_rays, 1 / 3)]),
+    )
 
 
-def _table(half: Transport, patches: Patches, effort: Effort) -> Float32:
-    table = np.zeros((2 * len(patches.area) + 2, COLUMNS), dtype=np.float32)
-    reflected = half.by_code(half.reflected)
-    table[:, REFLECTED] = reflected
-    table[2 * len(patches.area), SKY] = 1.0
-    if effort.emitters_by_rays:
-        table[:, EMITTED] = half.by_code(np.pi * half.sides.emission)
-    table[:, COARSER] = half.by_code(half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True)))[:, 0]
-    return table
+def _table(half: Transport, sky: bool, emitters: bool) -> Float32:
+    columns = [half.by_code(half.reflected)]
+    if sky:
+        open_sky = np.zeros((len(columns[0]), 1), dtype=np.float32)
+        open_sky[Codes(len(half.sides.patches.area)).escaped] = 1.0
+        columns.append(open_sky)
+    if emitters:
+        columns.append(half.by_code(np.pi * half.sides.emission))
+    columns.append(half.by_code(half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True))))
+    return np.concatenate(columns, axis=1)
+
+
+def inside_solid(enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
+    """Points (n,) that see only backs, and no light to speak of: the inside of a solid, which nobody ever sees.
+
+    A room whose normals face outward is all backs too, but light gets into it. indirect, direct (n,): mean irradiance.
+    """
+    total = indirect + direct
+    return np.asarray(enclosed & (total <= _DARK * total.mean()) & (direct <= 0))
 
 
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
-    indirect: channels red, green, blue of reflected light, open sky, emitting surfaces (3), and the mean of it all;
+    indirect: a channel for each column of the surroundings but the last, and then the mean irradiance of them all;
     direct: red, green, blue and their mean. coarser (c,): sum over passes of the difference that coarser patches make.
     """
 
@@ -72,27 +100,26 @@ class Survey:
         receivers: Receivers,
         direct_light: DirectLight,
         surroundings: Surroundings | None,
-        sky: Float64,
         effort: Effort,
         seed: int,
         workers: Workers,
     ) -> None:
         count = len(receivers.cells)
         self.receivers = receivers
-        self.indirect = [Samples(count, 8), Samples(count, 8)]
+        self.surroundings = surroundings
+        channels = len(surroundings.to_grey) + 1 if surroundings else 0
+        self.indirect = [Samples(count, channels), Samples(count, channels)]
         self.direct = [Samples(count, 4), Samples(count, 4)]
         self.coarser = np.zeros(count)
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
         self.rays = {"gather": 0, "shadow": 0}
         self._light = direct_light
-        self._surroundings = surroundings
-        self._sky = np.pi * sky
         self._effort = effort
         self._seed = seed
         self._workers = workers
         self._shift = stream(seed, "cells").random((count, 2))
-        self._signatures: list[np.ndarray] = []
+        self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
 
     @property
@@ -107,25 +134,30 @@ class Survey:
         points = Points(self.receivers.cells, every, number, self._shift)
         light = self._direct(points, number)
         valid = np.ones(len(every), dtype=bool)
-        if self._surroundings is not None:
-            hemispheres = self._surroundings.hemispheres
-            table = self._surroundings.tables[number % 2]
-            arriving, variance, enclosed = gather_indirect(
-                points, hemispheres, table, self._seed, number, self._workers
-            )
-            self.rays["gather"] += len(every) * hemispheres.rays
-            self.coarser += arriving[:, COARSER] - arriving[:, REFLECTED].mean(axis=1)
-            total = arriving[:, :COARSER] @ self._to_grey()
-            spread = variance[:, :COARSER] @ self._to_grey() ** 2 * 3.0
-            dark = total + light.irradiance.mean(axis=1) <= _DARK * (total + light.irradiance.mean(axis=1)).mean()
-            valid = ~(enclosed & dark & (light.irradiance.max(axis=1) <= 0))
-            values = np.column_stack([arriving[:, :COARSER], total])
-            noise = np.column_stack([variance[:, :COARSER], spread])
-            self.indirect[number % 2].add(slice(None), points.barycentric, values, noise, valid)
+        if self.surroundings is not None:
+            valid = self._look_around(self.surroundings, points, light, number)
         self.invalid |= ~valid
         self._add_direct(number, slice(None), points, light, valid)
         self._signatures.append(light.signature)
         self.passes += 1
+
+    def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
+        """Add the indirect light at the points; which of them (c,) are not inside a solid."""
+        half = number % 2
+        arriving, variance, enclosed = gather_indirect(
+            points, around.hemispheres, around.tables[half], self._seed, number, self._workers
+        )
+        self.rays["gather"] += len(arriving) * around.hemispheres.rays
+        self.coarser += arriving[:, -1] - arriving[:, :3].mean(axis=1)
+        values, noise = arriving[:, :-1], variance[:, :-1]
+        grey = values @ around.to_grey
+        valid = ~inside_solid(enclosed, grey, light.irradiance.mean(axis=1))
+        # The channels of one ray rise and fall together, so the mean's deviation is the mean of the deviations.
+        spread = (np.sqrt(noise) @ around.to_grey) ** 2
+        self.indirect[half].add(
+            slice(None), points.barycentric, np.column_stack([values, grey]), np.column_stack([noise, spread]), valid
+        )
+        return valid
 
     def refine_boundaries(self, passes: int) -> None:
         """More points, for direct light only, in the cells that shadow boundaries cross."""
@@ -149,14 +181,8 @@ class Survey:
         return light
 
     def _add_direct(
-        self, half: int, index: np.ndarray | slice, points: Points, light: Illumination, valid: Bool
+        self, half: int, index: NDArray[np.int64] | slice, points: Points, light: Illumination, valid: Bool
     ) -> None:
         values = np.column_stack([light.irradiance, light.irradiance.mean(axis=1)])
-        noise = np.column_stack([light.variance, light.variance.mean(axis=1)])
+        noise = np.column_stack([light.variance, np.sqrt(light.variance).mean(axis=1) ** 2])
         self.direct[half % 2].add(index, points.barycentric, values, noise, valid)
-
-    def _to_grey(self) -> Float64:
-        """Weights (COARSER,) that turn the columns of what arrives into the mean of the three channels."""
-        weights = np.full(COARSER, 1.0 / 3.0)
-        weights[SKY] = self._sky.mean()
-        return weights

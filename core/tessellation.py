@@ -10,8 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .scene import Float64, Int32
+from .scene import Bool, Float64, Int32
+
+Int64 = NDArray[np.int64]
 
 # Children of a triangle a, b, c with edge midpoints d = ab, e = bc, f = ca, as indices into (a, b, c, d, e, f).
 _FOUR = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [4, 5, 3]])
@@ -58,9 +61,22 @@ def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
     corners = mesh.vertices[mesh.triangles]
     edges = corners[:, [1, 2, 0]] - corners
     marked = np.einsum("tij,tij->ti", edges, edges) > longest_edge * longest_edge
+    return _split(mesh, marked)[0] if marked.any() else mesh
+
+
+def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int64]:
+    """Split the chosen (t,) triangles into four, and their neighbours so that no crack opens.
+
+    Also returns, for each new triangle, the one it came from.
+    """
+    ends = np.sort(np.stack([mesh.triangles, mesh.triangles[:, [1, 2, 0]]], axis=2), axis=2).astype(np.int64)
+    keys = ends[..., 0] * len(mesh.vertices) + ends[..., 1]
+    return _split(mesh, np.isin(keys, keys[chosen]))
+
+
+def _split(mesh: Tessellation, marked: Bool) -> tuple[Tessellation, Int64]:
+    """Split the marked edges (t, 3): from corner 0 to 1, 1 to 2, 2 to 0. Both sides of an edge must agree."""
     count = marked.sum(axis=1)
-    if not count.any():
-        return mesh
     midpoint, vertices = _midpoints(mesh, marked)
     six = np.concatenate([mesh.triangles, midpoint], axis=1)
     weights = np.concatenate([mesh.barycentric, (mesh.barycentric + mesh.barycentric[:, [1, 2, 0]]) / 2], axis=1)
@@ -71,22 +87,25 @@ def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
     six = np.take_along_axis(six, order, axis=1)
     weights = np.take_along_axis(weights, order[:, :, None], axis=1)
 
-    triangles, barycentric, source = [], [], []
+    triangles, barycentric, sources = [], [], []
     for template, chosen in _templates(count, vertices, six):
         triangles.append(six[chosen][:, template].reshape(-1, 3))
         barycentric.append(weights[chosen][:, template].reshape(-1, 3, 3))
-        source.append(np.repeat(chosen, len(template)))
+        sources.append(np.repeat(chosen, len(template)))
     # Children stand where their parent stood, so neighbours in space stay neighbours in memory.
-    back = np.argsort(np.concatenate(source), kind="stable")
-    return Tessellation(
+    source = np.concatenate(sources)
+    back = np.argsort(source, kind="stable")
+    source = source[back]
+    children = Tessellation(
         vertices,
         np.concatenate(triangles)[back].astype(np.int32),
-        mesh.parent[np.concatenate(source)[back]],
+        mesh.parent[source],
         np.concatenate(barycentric)[back],
     )
+    return children, source
 
 
-def _midpoints(mesh: Tessellation, marked: np.ndarray) -> tuple[Int32, Float64]:
+def _midpoints(mesh: Tessellation, marked: Bool) -> tuple[Int32, Float64]:
     """One new vertex for each marked edge, shared by the triangles on both of its sides."""
     ends = np.stack([mesh.triangles, mesh.triangles[:, [1, 2, 0]]], axis=2)[marked]
     ends.sort(axis=1)

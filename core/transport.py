@@ -9,7 +9,7 @@ import numpy as np
 from .direct.illumination import DirectLight
 from .form_factors.analytic import analytic_rows
 from .form_factors.centroid import centroid_rows
-from .form_factors.hemisphere import SITES, Sides, hemisphere_rows
+from .form_factors.hemisphere import Sides, hemisphere_rows
 from .form_factors.rows import Rows, balance, symmetric_exchange
 from .parallel import Workers
 from .patches import Patches, coarser_groups
@@ -19,7 +19,7 @@ from .scene import Float32, Float64
 from .solver import Solution, shoot_until, solve
 from .visibility import Visibility
 
-_CHUNK = 2048
+_CHUNK = 1024
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +153,14 @@ def light_on_sides(
     sides: Sides, direct_light: DirectLight, workers: Workers, shadow_rays: int, seed: int, purpose: str
 ) -> tuple[Float64, int]:
     """Mean irradiance (s, 3) of each side straight from lamps and emitting surfaces, and the rays it took."""
-    sites = [sides.sites(seed, "light " + purpose, number) for number in range(SITES)]
 
     def work(number: int, part: slice) -> tuple[Float64, int]:
         rng = stream(seed, "light on sides " + purpose, number)
-        parts = [direct_light.at(p[part], n[part], n[part], shadow_rays, rng) for p, n in sites]
-        return np.mean([p.irradiance for p in parts], axis=0), sum(p.rays for p in parts)
+        normals = sides.normals[part].reshape(-1, 3)
+        light = direct_light.at(sides.points[part].reshape(-1, 3), normals, normals, shadow_rays, rng)
+        seen = ~sides.hidden[part]
+        total = np.einsum("snk,sn->sk", light.irradiance.reshape(*seen.shape, 3), seen)
+        return total / seen.sum(axis=1)[:, None], light.rays
 
     irradiance, rays = zip(*workers.map(work, len(sides.side), _CHUNK), strict=True)
     return np.concatenate(irradiance), sum(rays)

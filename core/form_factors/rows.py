@@ -92,7 +92,7 @@ class Rows:
             filled = np.flatnonzero(np.diff(pointers))
             first = pointers[filled] - pointers[0]
             for channel, out in zip(channels, result, strict=True):
-                terms = np.take(channel, columns, mode="clip")
+                terms = channel[columns]
                 terms *= weights
                 out[part.start + filled] = _segment_sums(terms, first)
 
@@ -128,13 +128,14 @@ def symmetric_exchange(rows: Rows, areas: ArrayLike, samples: ArrayLike = 1.0) -
 
 
 def balance(
-    exchange: Rows, targets: ArrayLike, workers: Workers | None = None, *, tolerance: float = 1e-6, steps: int = 100
+    exchange: Rows, targets: ArrayLike, workers: Workers | None = None, *, tolerance: float = 1e-6, steps: int = 12
 ) -> Rows:
-    """Scale symmetric G to d_i G_ij d_j whose rows sum to the targets (n,), never to more.
+    """Scale symmetric G to d_i G_ij d_j whose rows sum to the targets (n,), exactly.
 
-    Symmetric Sinkhorn iteration (P. Knight, The Sinkhorn-Knopp algorithm, 2008), until every row is within `tolerance`
-    of its target. A row with target zero, and its column, become zero; an empty row stays empty. Where the targets
-    cannot be reached (a patch that sees only one smaller than itself) the rows end below them.
+    Symmetric Sinkhorn iteration (P. Knight, The Sinkhorn-Knopp algorithm, 2008) for a handful of steps, or until every
+    row is within `tolerance` of its target. What a row still lacks then becomes light it sends to itself: symmetric as
+    well, and small, but where the targets cannot be reached (a patch that sees only one smaller than itself). A row
+    with target zero, and its column, become zero; an empty row stays empty.
     """
     target = np.maximum(np.asarray(targets, dtype=np.float64), 0.0)
     scale = (target > 0.0).astype(np.float64)
@@ -148,7 +149,19 @@ def balance(
     weights = scale[i] * exchange.weights * scale[j]
     sums = _sums(i, weights, len(exchange))
     excess = np.divide(target, sums, out=np.ones_like(sums), where=sums > target)
-    return Rows(exchange.indptr, j, (weights * np.minimum(excess[i], excess[j])).astype(np.float32))
+    weights *= np.minimum(excess[i], excess[j])
+    lacking = np.where(sums > 0.0, np.maximum(target - _sums(i, weights, len(exchange)), 0.0), 0.0)
+    return _with_diagonal(Rows(exchange.indptr, j, weights.astype(np.float32)), lacking)
+
+
+def _with_diagonal(rows: Rows, diagonal: Float64) -> Rows:
+    """Rows with one more entry at the end of each: the diagonal (n,)."""
+    end = rows.indptr[1:]
+    return Rows(
+        rows.indptr + np.arange(len(rows) + 1),
+        np.insert(rows.columns, end, np.arange(len(rows), dtype=np.int32)),
+        np.insert(rows.weights, end, diagonal.astype(np.float32)),
+    )
 
 
 def _pointers(lengths: ArrayLike) -> Int64:
