@@ -26,6 +26,9 @@ WHITE_PERCENTILE, WHITE_VALUE = 95.0, 0.8
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, Blender's scene-linear primaries
 
+#: What Blender writes into a picture besides the picture: the file's path, the date, how long it took.
+METADATA = ("camera", "date", "filename", "frame", "lens", "marker", "memory", "render_time", "scene", "time")
+
 #: Where the stand-in camera looks from when the scene has none: front, right and above.
 THREE_QUARTER_VIEW = Vector((1.0, -1.6, 0.9))
 
@@ -120,10 +123,12 @@ def _studio(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Iter
 
 
 def _show_values(studio: bpy.types.Scene) -> None:
-    """Colours as they are: no light, no shadow, no outline, and the plain sRGB curve of the Standard view."""
+    """Colours and nothing but them: no light, no outline, and the plain sRGB curve of the Standard view."""
     studio.render.engine = "BLENDER_WORKBENCH"
     image = studio.render.image_settings
     image.file_format, image.color_mode = "PNG", "RGB"
+    for entry in METADATA:
+        setattr(studio.render, f"use_stamp_{entry}", False)
     studio.display.render_aa = "8"
     shading = studio.display.shading
     shading.light, shading.color_type = "FLAT", "VERTEX"

@@ -141,6 +141,13 @@ def settings_and_data(scene: bpy.types.Scene) -> dict:
     return values | names | {"frame": scene.frame_current, "window": bpy.context.scene.name}
 
 
+def test_the_picture_tells_nothing_about_this_machine(tmp_path: Path):
+    plane = add_plane("Plane", (0.5, 0.5, 0.5))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "scene.blend"))
+    render_preview(bpy.context.scene, [plane], tmp_path / "p.png", attribute="Radiosity")
+    assert b"tEXt" not in (tmp_path / "p.png").read_bytes()
+
+
 def test_an_object_without_the_attribute_is_named(tmp_path: Path):
     plane = add_plane("Bare", (0.0, 0.0, 0.0))
     with pytest.raises(SceneError, match=r"'Bare'.*'Light'.*bake it first"):
