@@ -117,7 +117,8 @@ def test_report_and_preview_come_beside_it(scene_file: Path, out: Path, capsys):
 def subprocess_version() -> str:
     """What `radiosity-baker --version` prints, by the console script of this environment."""
     script = Path(sys.executable).parent / "radiosity-baker"
-    return subprocess.run([str(script), "--version"], capture_output=True, text=True, check=True).stdout.splitlines()[-1]
+    run = subprocess.run([str(script), "--version"], capture_output=True, text=True, check=True)
+    return run.stdout.splitlines()[-1]
 
 
 @pytest.mark.usefixtures("painted")
