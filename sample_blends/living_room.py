@@ -100,7 +100,7 @@ BOOK_COLOURS: list[Colour] = [
 def build() -> None:
     scene = new_scene(world_colour=(0.52, 0.72, 1.0), world_strength=4.5)
     scene.render.resolution_x, scene.render.resolution_y = 1200, 800
-    show(scene, "Standard")
+    show(scene, "Standard", exposure=0.2)
     paint = {name: diffuse(name, colour) for name, colour in PALETTE.items()}
     books = [diffuse(f"Book {k + 1}", colour) for k, colour in enumerate(BOOK_COLOURS)]
     floor_boards = [paint[name] for name in ("Oak", "Light oak", "Honey oak", "Dark oak", "Grey oak")]
@@ -193,7 +193,7 @@ def boards(woods: list[Material]) -> Shape:
 def skirting(material: Material) -> Shape:
     """A board around the foot of the walls, mitred in the corners."""
     thickness, height = 0.016, 0.09
-    profile = [(GAP, GAP), (thickness, GAP), (thickness, height - 0.008), (thickness - 0.008, height), (GAP, height)]
+    profile = [(GAP, GAP), (thickness, GAP), (thickness, height), (GAP, height)]
     corners = [(0.0, 0.0), (WIDTH, 0.0), (WIDTH, DEPTH), (0.0, DEPTH)]
     inward = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
     vertices = [
@@ -273,17 +273,17 @@ def sofa(seats: int, cloth: Material, wood: Material) -> Shape:
     ]
     base = rounded_box((inside - 2.0 * GAP, depth, 0.19), 0.025, cloth, steps=2).moved(z=0.11 + GAP)
     arms = [
-        rounded_box((arm, depth, 0.47), 0.07, cloth).moved(side * (inside + arm) / 2.0, 0.0, 0.11 + GAP)
+        rounded_box((arm, depth, 0.47), 0.07, cloth, steps=2).moved(side * (inside + arm) / 2.0, 0.0, 0.11 + GAP)
         for side in (-1, 1)
     ]
-    back = rounded_box((inside - 2.0 * GAP, 0.20, 0.52), 0.07, cloth)
+    back = rounded_box((inside - 2.0 * GAP, 0.20, 0.52), 0.07, cloth, steps=2)
     back = back.moved(0.0, depth / 2.0 - 0.10, 0.30 + 2.0 * GAP)
     cushions = []
     for k in range(seats):
         x = (k - (seats - 1) / 2.0) * seat
-        flat_cushion = rounded_box((seat - 0.03, 0.64, 0.13), 0.045, cloth, steps=2, flat=3, bulge=0.012)
+        flat_cushion = rounded_box((seat - 0.03, 0.64, 0.13), 0.045, cloth, steps=2, bulge=0.012)
         cushions.append(flat_cushion.moved(x, -depth / 2.0 + 0.335, 0.30 + 2.0 * GAP))
-        leaning = rounded_box((seat - 0.05, 0.13, 0.40), 0.055, cloth, steps=2, flat=3, bulge=0.016)
+        leaning = rounded_box((seat - 0.05, 0.13, 0.40), 0.055, cloth, steps=2, bulge=0.016)
         cushions.append(leaning.turned(-11.0, "X").moved(x, depth / 2.0 - 0.335, 0.475))
     return join([*feet, base, *arms, back, *cushions])
 
@@ -292,7 +292,7 @@ def pillows(paint: dict[str, Material]) -> Shape:
     """Loose pillows that lean on the sofa's cushions."""
 
     def pillow(material: Material, size: float) -> Shape:
-        return rounded_box((size, 0.07, size), 0.034, material, steps=2, flat=4, bulge=0.04)
+        return rounded_box((size, 0.07, size), 0.034, material, steps=2, flat=3, bulge=0.04)
 
     return join(
         [
@@ -305,9 +305,9 @@ def pillows(paint: dict[str, Material]) -> Shape:
 
 def pouf(cloth: Material) -> Shape:
     """A round stool with a swelling belly, gathered into sixteen ribs."""
-    angles = np.linspace(-pi / 2.0, pi / 2.0, 13)
+    angles = np.linspace(-pi / 2.0, pi / 2.0, 9)
     belly = [(0.17 + 0.12 * np.cos(a), 0.17 + 0.17 * np.sin(a)) for a in angles]
-    stool = lathe([(0.0, 0.0), *belly, (0.09, 0.348), (0.0, 0.35)], cloth, 64)
+    stool = lathe([(0.0, 0.0), *belly, (0.09, 0.348), (0.0, 0.35)], cloth, 48)
 
     def gather(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         rib = 1.0 + 0.035 * np.cos(16.0 * np.arctan2(y, x)) * np.clip(np.hypot(x, y) / 0.2, 0.0, 1.0)
@@ -342,11 +342,11 @@ def table_things(paint: dict[str, Material], books: list[Material]) -> Shape:
             (0.0, 0.012),
         ],
         paint["Blue glaze"],
-        32,
+        24,
     ).moved(0.06, 0.03)
     nest = [(0.0, 0.075, 0.024), (0.066, -0.036, 0.024), (-0.066, -0.036, 0.024), (0.0, 0.0, 0.074)]
-    oranges = [sphere(0.036, paint["Orange"], 20).moved(0.06 + 0.62 * x, 0.03 + 0.62 * y, z) for x, y, z in nest[:3]]
-    oranges.append(sphere(0.035, paint["Orange"], 20).moved(0.06, 0.03, 0.0815))
+    oranges = [sphere(0.036, paint["Orange"], 14).moved(0.06 + 0.62 * x, 0.03 + 0.62 * y, z) for x, y, z in nest[:3]]
+    oranges.append(sphere(0.035, paint["Orange"], 14).moved(0.06, 0.03, 0.0815))
     vase = lathe(
         [
             (0.0, 0.0),
@@ -362,7 +362,7 @@ def table_things(paint: dict[str, Material], books: list[Material]) -> Shape:
             (0.0, 0.02),
         ],
         paint["Glaze"],
-        32,
+        24,
     ).moved(-0.36, 0.12)
     pile, z = [], 0.0
     for k, (colour, size, turn) in enumerate(
@@ -422,10 +422,10 @@ def _ornament(level: int, paint: dict[str, Material]) -> Shape:
     jar = [(0.0, 0.0), (0.05, 0.0), (0.075, 0.07), (0.06, 0.15), (0.03, 0.17), (0.035, 0.20), (0.0, 0.20)]
     bottle = [(0.0, 0.0), (0.04, 0.0), (0.05, 0.09), (0.018, 0.16), (0.016, 0.23), (0.0, 0.23)]
     if level % 3 == 0:
-        return lathe(jar, paint["Blue glaze" if level else "Terracotta"], 28)
+        return lathe(jar, paint["Blue glaze" if level else "Terracotta"], 20)
     if level % 3 == 1:
-        return sphere(0.07, paint["Brass" if level == 1 else "Rose cloth"], 24)
-    return lathe(bottle, paint["Glaze" if level == 2 else "Teal cloth"], 28)
+        return sphere(0.07, paint["Brass" if level == 1 else "Rose cloth"], 18)
+    return lathe(bottle, paint["Glaze" if level == 2 else "Teal cloth"], 20)
 
 
 def floor_lamp(paint: dict[str, Material]) -> Shape:
@@ -482,7 +482,7 @@ def plant(paint: dict[str, Material]) -> Shape:
 
 def _leaf(start: float, reach: float, rise: float, width: float) -> np.ndarray:
     """A long leaf (n, 3, 3) that starts upright above the soil, arches over x and hangs at its tip."""
-    t = np.linspace(0.0, 1.0, 9)
+    t = np.linspace(0.0, 1.0, 8)
     x = start + reach * t**1.6
     z = 0.302 + rise * (t - 0.48 * t**3.2)
     half = width * (0.18 + np.sin(pi * np.clip(t, 0.0, 0.97) ** 0.75) * 0.9)

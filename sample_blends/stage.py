@@ -70,7 +70,7 @@ SPOTS: list[tuple[str, float, Colour, tuple[float, ...], tuple[float, ...], floa
 def build() -> None:
     scene = new_scene(world_colour=(0.0, 0.0, 0.0))
     scene.render.resolution_x, scene.render.resolution_y = 1200, 800
-    show(scene, "Standard")
+    show(scene, "Standard", exposure=0.1)
     paint = {name: diffuse(name, colour) for name, colour in PALETTE.items()}
 
     knot = torus_knot(paint["Ivory"])
@@ -85,9 +85,9 @@ def build() -> None:
         add_mesh("Amphora", amphora(paint["Gold"]), at=(-2.75, 0.25, 0.902)),
         add_mesh("Dancer plinth", drum(0.52, 0.20, paint["Plinth"]), at=(2.75, 0.25, GAP)),
         add_mesh("Dancer", dancer(paint["Plaster"]), at=(2.75, 0.25, 0.201)),
-        add_mesh("Coral ball", sphere(0.34, paint["Coral"], 40), at=(-1.35, -1.75, GAP)),
-        add_mesh("Blue ball", sphere(0.22, paint["Blue"], 32), at=(1.70, -1.55, GAP)),
-        add_mesh("Ivory ball", sphere(0.13, paint["Ivory"], 28), at=(1.22, -2.0, GAP)),
+        add_mesh("Coral ball", sphere(0.34, paint["Coral"], 32), at=(-1.35, -1.75, GAP)),
+        add_mesh("Blue ball", sphere(0.22, paint["Blue"], 28), at=(1.70, -1.55, GAP)),
+        add_mesh("Ivory ball", sphere(0.13, paint["Ivory"], 24), at=(1.22, -2.0, GAP)),
         add_mesh("Left column", column(paint["Plaster"]), at=(-3.65, 1.9, GAP)),
         add_mesh("Right column", column(paint["Plaster"]), at=(3.65, 1.9, GAP)),
         add_mesh("Left curtain", curtain(paint["Velvet"]), at=(-4.0, -1.2, 0.01)),
@@ -97,7 +97,7 @@ def build() -> None:
     for name, power, colour, position, target, angle, blend in SPOTS:
         spot_lamp(name, power, colour, position, target, angle=angle, blend=blend, radius=0.05)
         receivers.append(aim(add_mesh(f"{name} can", can(paint["Iron"]), at=position), target))
-    point_lamp("Ember", 55.0, (1.0, 0.42, 0.12), at=middle, radius=0.07)
+    point_lamp("Ember", 30.0, (1.0, 0.42, 0.12), at=middle, radius=0.07)
     add_camera(at=(0.0, -8.6, 1.8), target=(0.0, 0.0, 1.66), focal_length=37.0)
     save(Path(__file__).with_name("stage.blend"), receivers)
 
@@ -141,16 +141,16 @@ def drum(radius: float, height: float, material: Material) -> Shape:
 
 def torus_knot(material: Material) -> Shape:
     """The (2, 3) torus knot, upright, its middle at the origin."""
-    t = np.linspace(0.0, 2.0 * pi, 144, endpoint=False)
+    t = np.linspace(0.0, 2.0 * pi, 120, endpoint=False)
     ring = 0.62 + 0.255 * np.cos(3.0 * t)
     line = np.column_stack([ring * np.sin(2.0 * t), 0.285 * np.sin(3.0 * t), ring * np.cos(2.0 * t)])
-    return tube(line, 0.13, material, 20, closed=True)
+    return tube(line, 0.13, material, 16, closed=True)
 
 
 def draped_table(material: Material) -> Shape:
     """A round table under a cloth that falls to the floor in folds."""
     edge = curve([(0.44, 0.90), (0.485, 0.87), (0.50, 0.78), (0.53, 0.45), (0.59, 0.15), (0.66, 0.0)], 3)
-    solid = lathe([(0.0, 0.9), (0.22, 0.9), *edge, (0.0, 0.0)], material, 120)
+    solid = lathe([(0.0, 0.9), (0.22, 0.9), *edge, (0.0, 0.0)], material, 96)
 
     def fold(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         angle, fall = np.arctan2(y, x), np.clip((0.88 - z) / 0.88, 0.0, 1.0)
@@ -166,10 +166,10 @@ def amphora(material: Material) -> Shape:
     profile = curve(
         [(0.12, 0.0), (0.10, 0.05), (0.23, 0.32), (0.245, 0.46), (0.10, 0.64), (0.085, 0.74), (0.14, 0.80)], 5
     )
-    body = lathe([(0.0, 0.0), *profile, (0.12, 0.80), (0.07, 0.745), (0.0, 0.735)], material, 48)
-    a = np.linspace(0.0, 1.0, 17)
+    body = lathe([(0.0, 0.0), *profile, (0.12, 0.80), (0.07, 0.745), (0.0, 0.735)], material, 36)
+    a = np.linspace(0.0, 1.0, 11)
     handle = np.column_stack([0.088 + 0.17 * np.sin(pi * a) ** 0.8 + 0.135 * a, 0.0 * a, 0.735 - 0.20 * a])
-    return join([body, *(tube(handle * (side, 1.0, 1.0), 0.017, material, 10) for side in (1.0, -1.0))])
+    return join([body, *(tube(handle * (side, 1.0, 1.0), 0.017, material, 8) for side in (1.0, -1.0))])
 
 
 def dancer(material: Material) -> Shape:
@@ -178,7 +178,7 @@ def dancer(material: Material) -> Shape:
     torso = curve([(0.115, 0.92), (0.17, 1.10), (0.20, 1.24), (0.15, 1.35), (0.065, 1.42), (0.058, 1.48)], 3)
     angles = np.linspace(-1.12, pi / 2.0, 11)[:-1]
     head = [(0.135 * np.cos(a), 1.60 + 0.155 * np.sin(a)) for a in angles]
-    solid = lathe([(0.0, 0.0), *skirt, *torso[1:], *head, (0.0, 1.755)], material, 72)
+    solid = lathe([(0.0, 0.0), *skirt, *torso[1:], *head, (0.0, 1.755)], material, 60)
 
     def pleat(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, ...]:
         angle, fall = np.arctan2(y, x), np.clip((0.9 - z) / 0.9, 0.0, 1.0)
@@ -191,7 +191,7 @@ def dancer(material: Material) -> Shape:
 def column(material: Material) -> Shape:
     """A fluted column with base and capital."""
     base = [(0.0, 0.0), (0.40, 0.0), (0.40, 0.10), (0.36, 0.12), (0.36, 0.17), (0.31, 0.20)]
-    shaft = [(0.285 - 0.045 * t, 0.24 + 3.2 * t) for t in np.linspace(0.0, 1.0, 6)]
+    shaft = [(0.285 - 0.045 * t, 0.24 + 3.2 * t) for t in np.linspace(0.0, 1.0, 3)]
     capital = [(0.29, 3.50), (0.36, 3.60), (0.36, 3.72), (0.0, 3.72)]
     solid = lathe([*base, *shaft, *capital], material, 64)
 
@@ -207,13 +207,13 @@ def truss(material: Material) -> Shape:
     """Two rails with a zigzag between them, from which the lamps hang."""
     length, height, bays = 10.6, 0.30, 18
     rails = [
-        tube(np.array([(-length / 2.0, 0.0, z), (length / 2.0, 0.0, z)]), 0.03, material, 10) for z in (0.0, height)
+        tube(np.array([(-length / 2.0, 0.0, z), (length / 2.0, 0.0, z)]), 0.03, material, 6) for z in (0.0, height)
     ]
     x = np.linspace(-length / 2.0 + 0.1, length / 2.0 - 0.1, bays + 1)
     braces = []
     for k in range(bays):
         low, high = (0.05, height - 0.05)[:: 1 if k % 2 else -1]
-        braces.append(tube(np.array([(x[k] + 0.03, 0.0, low), (x[k + 1] - 0.03, 0.0, high)]), 0.012, material, 6))
+        braces.append(tube(np.array([(x[k] + 0.03, 0.0, low), (x[k + 1] - 0.03, 0.0, high)]), 0.012, material, 4))
     return join([*rails, *braces])
 
 
