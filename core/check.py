@@ -24,9 +24,9 @@ def check_scene(scene: Scene) -> Scene:
     for lamp in scene.lamps:
         if not np.isfinite(np.concatenate([np.ravel(v) for v in vars(lamp).values() if not isinstance(v, str)])).all():
             raise SceneError(f"Lamp '{lamp.name}' has a value that is not a number: check its transform and its power.")
-    extent = max(float(np.ptp(o.vertices, axis=0).max()) for o in objects)
+    extent = max(float(np.max(np.ptp(o.vertices, axis=0))) for o in objects)
     away = max(float(np.abs(o.vertices).max()) for o in objects)
-    if away > _FAR * max(extent, np.finfo(float).tiny):
+    if away > _FAR * max(extent, 1e-30):
         warnings.append(
             f"The scene is {away / extent:,.0f} times its own size away from the origin, where Blender's coordinates "
             "are coarse: move it nearer for an exact bake."

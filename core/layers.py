@@ -9,7 +9,8 @@ import numpy as np
 from .receivers import Receivers
 from .refinement import Light
 from .result import BakedObject
-from .scene import Float32, Float64, Scene
+from .scene import Float32, Float64, Scene, SceneError
+from .settings import LAYERS
 
 
 def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple[str, ...]) -> Iterator[BakedObject]:
@@ -28,7 +29,7 @@ def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple
 
 
 def radiance(name: str, scene: Scene, receivers: Receivers, light: Light) -> Float32:
-    """One layer (e, 3, 3) over all output triangles. Raises KeyError for a layer that does not exist."""
+    """One layer (e, 3, 3) over all output triangles. Raises SceneError for a layer that does not exist."""
     albedo = np.array([s.albedo for s in scene.surfaces])[receivers.element_surface][:, None]
     emission = np.array([s.emission for s in scene.surfaces])[receivers.element_surface][:, None]
     sky = light.open_sky[:, None] * np.pi * np.array(scene.sky)
@@ -37,17 +38,26 @@ def radiance(name: str, scene: Scene, receivers: Receivers, light: Light) -> Flo
     def reflect(irradiance: Float64) -> Float64:
         return albedo * irradiance[receivers.corner_vertex] / np.pi
 
+    def layer() -> Float64:
+        match name:
+            case "combined":
+                return emission + reflect(straight + light.reflected)
+            case "light":
+                return (straight + light.reflected)[receivers.corner_vertex] / np.pi
+            case "direct":
+                return reflect(straight)
+            case "indirect":
+                return reflect(light.reflected)
+            case "emission":
+                return np.broadcast_to(emission, shape)
+            case "sky":
+                return reflect(sky)
+            case "error":
+                return np.broadcast_to(_standard_error(receivers, light)[:, :, None], shape)
+        raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
+
     shape = (*receivers.corner_vertex.shape, 3)
-    values = {
-        "combined": lambda: emission + reflect(straight + light.reflected),
-        "light": lambda: (straight + light.reflected)[receivers.corner_vertex] / np.pi,
-        "direct": lambda: reflect(straight),
-        "indirect": lambda: reflect(light.reflected),
-        "emission": lambda: np.broadcast_to(emission, shape),
-        "sky": lambda: reflect(sky),
-        "error": lambda: np.broadcast_to(_standard_error(receivers, light)[:, :, None], shape),
-    }
-    return np.ascontiguousarray(values[name](), dtype=np.float32)
+    return np.ascontiguousarray(layer(), dtype=np.float32)
 
 
 def _standard_error(receivers: Receivers, light: Light) -> Float64:

@@ -56,7 +56,7 @@ def unit_space(scene: Scene) -> Space:
     """The smallest cube around all objects, blown up by nothing: its half edge becomes one."""
     low = np.min([o.vertices[o.triangles].min(axis=(0, 1)) for o in scene.objects], axis=0)
     high = np.max([o.vertices[o.triangles].max(axis=(0, 1)) for o in scene.objects], axis=0)
-    return Space((low + high) / 2, max(float((high - low).max()) / 2, np.finfo(np.float32).tiny))
+    return Space((low + high) / 2, max(float((high - low).max()) / 2, 1e-30))
 
 
 def triangle_geometry(corners: Float64) -> tuple[Float64, Float64]:
@@ -93,7 +93,7 @@ def make_patches(scene: Scene, space: Space, wanted: int) -> Patches:
         patch=patch,
         members=members,
         first=np.concatenate([[0], np.cumsum(np.bincount(patch, minlength=count))]).astype(np.int32),
-        patch_area=np.bincount(patch, weights=area, minlength=count),
+        patch_area=np.bincount(patch, weights=area, minlength=count).astype(np.float64),
         albedo=np.array([s.albedo for s in scene.surfaces], dtype=np.float32)[patch_surface],
         emission=np.array([s.emission for s in scene.surfaces], dtype=np.float32)[patch_surface],
     )

@@ -180,7 +180,7 @@ class Fit:
         return values[self._corner]
 
     def _scatter(self, corner_values: Float64) -> Float64:
-        return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count)
+        return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count).astype(np.float64)
 
     def fill(self, values: Float64) -> Float64:
         """Give vertices that no valid sample touched the mean of their neighbours, for a few rings from what is known.
