@@ -1,17 +1,19 @@
 # make bake        set up, and bake the Cornell box sample into build/
 # make test        set up, and run every check, on each Python that Blender uses and this machine has
 # make extension   one installable package per platform, in build/extension/
+# make test-4.5    the tests on Blender 4.5 as well
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-3.13 lint samples extension test-gui clean
+.PHONY: bake test test-3.13 test-4.5 lint samples extension test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
 # Blender 5.0 as a Python module needs Python 3.11, Blender 5.2 needs 3.13. Every recipe works with either.
 PYTHON = $(shell packaging/find-python 3.11 3.13)
+PYTHON_3.11 = $(shell packaging/find-python 3.11)
 PYTHON_3.13 = $(shell packaging/find-python 3.13)
 
 bake: .venv/ready
@@ -31,6 +33,9 @@ test: lint
 test-3.13: .venv-3.13/ready
 	.venv-3.13/bin/python -m pytest --quiet
 
+test-4.5: .venv-4.5/ready
+	.venv-4.5/bin/python -m pytest --quiet
+
 lint: .venv/ready
 	.venv/bin/ruff check --quiet
 	.venv/bin/ruff format --check --quiet
@@ -39,8 +44,8 @@ lint: .venv/ready
 extension: .venv/ready
 	.venv/bin/python packaging/build_extension.py
 
-samples: .venv/ready
-	for script in $$(grep -l __main__ sample_blends/*.py); do .venv/bin/python $$script || exit 1; done
+samples: .venv-4.5/ready
+	for script in $$(grep -l __main__ sample_blends/*.py); do .venv-4.5/bin/python $$script || exit 1; done
 
 test-gui: extension
 	tests/gui/run
@@ -57,6 +62,13 @@ test-gui: extension
 .venv-3.13/ready: pyproject.toml
 	test -x .venv-3.13/bin/python || "$(PYTHON_3.13)" -m venv .venv-3.13
 	.venv-3.13/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[blender,dev]'
+	@touch $@
+
+# The oldest Blender at hand as a module: every supported Blender reads the files it saves.
+.venv-4.5/ready: pyproject.toml
+	@test -n "$(PYTHON_3.11)" || { echo "This needs Blender 4.5 as a Python module, and so Python 3.11." >&2; exit 2; }
+	test -x .venv-4.5/bin/python || "$(PYTHON_3.11)" -m venv .venv-4.5
+	.venv-4.5/bin/python -m pip install --quiet --disable-pip-version-check 'bpy==4.5.*' --editable '.[dev]'
 	@touch $@
 
 clean:
