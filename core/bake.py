@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from .adaptation import Adaptation
 from .check import check_scene
 from .clock import Clock
-from .contacts import refine_contacts
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight
 from .direct.lamps import place
@@ -49,7 +49,9 @@ def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> 
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
-            receivers = refine_contacts(receivers, surroundings, direct_light, settings.seed, workers)
+            limit = 2 * max(len(receivers.cells), settings.triangles)
+            adaptation = Adaptation(direct_light, surroundings, limit, effort.error, settings.seed, workers)
+            receivers = adaptation.refine(receivers)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
         light = refine(survey, scene, settings, effort, workers, clock)
     with clock.stage("layers", 0.97):

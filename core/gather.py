@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from copy import copy
-
 import numpy as np
 
 from .direct.illumination import DirectLight, Illumination
@@ -30,13 +28,6 @@ class Points:
         if cells.shading is not None:
             blended = np.einsum("nc,nck->nk", self.weights, cells.shading[chosen])
             self.shading = blended / np.linalg.norm(blended, axis=1, keepdims=True)
-
-    def at(self, index: np.ndarray) -> Points:
-        """Some of the points."""
-        some = copy(self)
-        for name, values in vars(self).items():
-            setattr(some, name, values[index])
-        return some
 
 
 def gather_indirect(

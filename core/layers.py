@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
@@ -38,26 +38,19 @@ def radiance(name: str, scene: Scene, receivers: Receivers, light: Light) -> Flo
     def reflect(irradiance: Float64) -> Float64:
         return albedo * irradiance[receivers.corner_vertex] / np.pi
 
-    def layer() -> Float64:
-        match name:
-            case "combined":
-                return emission + reflect(straight + light.reflected)
-            case "light":
-                return (straight + light.reflected)[receivers.corner_vertex] / np.pi
-            case "direct":
-                return reflect(straight)
-            case "indirect":
-                return reflect(light.reflected)
-            case "emission":
-                return np.broadcast_to(emission, shape)
-            case "sky":
-                return reflect(sky)
-            case "error":
-                return np.broadcast_to(_standard_error(receivers, light)[:, :, None], shape)
-        raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
-
     shape = (*receivers.corner_vertex.shape, 3)
-    return np.ascontiguousarray(layer(), dtype=np.float32)
+    layers: dict[str, Callable[[], Float64]] = {
+        "combined": lambda: emission + reflect(straight + light.reflected),
+        "light": lambda: (straight + light.reflected)[receivers.corner_vertex] / np.pi,
+        "direct": lambda: reflect(straight),
+        "indirect": lambda: reflect(light.reflected),
+        "emission": lambda: np.broadcast_to(emission, shape),
+        "sky": lambda: reflect(sky),
+        "error": lambda: np.broadcast_to(_standard_error(receivers, light)[:, :, None], shape),
+    }
+    if name not in layers:
+        raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
+    return np.ascontiguousarray(layers[name](), dtype=np.float32)
 
 
 def _standard_error(receivers: Receivers, light: Light) -> Float64:

@@ -31,11 +31,13 @@ _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard a bake works. patches: wanted number; transport_rays: of a patch side; shadow_rays: to a lamp with size;
+    """How hard a bake works. error: relative, to aim at;
+    patches: wanted number; transport_rays: of a patch side; shadow_rays: to a lamp with size;
     gather_rays: of a sample point; passes over all cells before the error is first estimated, boundary_passes over the
     cells that shadow boundaries cross; tolerance: of the solve; threshold: form factor under which pairs are culled;
     emitters_by_rays: emitting triangles are too many to be lamps."""
 
+    error: float
     estimator: str
     patches: int
     transport_rays: int
@@ -84,6 +86,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     estimator = "hemisphere" if settings.estimator == "auto" else settings.estimator
     patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
     return Effort(
+        error=asked,
         estimator=estimator,
         patches=patches,
         transport_rays=64,

@@ -16,8 +16,6 @@ from .scene import Bool, Float64, Int32
 
 _TOLERANCE = 1e-4
 _MAXIMUM_ITERATIONS = 100
-#: How many rings of vertices around the last measured ones are filled in.
-FILLED_RINGS = 1
 #: Entries of a row of the fit's matrix that are kept in line: more than a vertex of a sound mesh has.
 _WIDTH = 24
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
@@ -133,14 +131,16 @@ class Fit:
     """Least squares onto the fit vertices of the receivers.
 
     count (c,): valid samples of each cell; where there is none the fit has nothing to say, and `fill` does.
+    hidden (c,): cells of which some sample was inside a solid.
     """
 
-    def __init__(self, receivers: Receivers, count: Float64) -> None:
+    def __init__(self, receivers: Receivers, count: Float64, hidden: Bool) -> None:
         self._receivers = receivers
         self._count = receivers.vertices
         self._corner = receivers.corner_vertex[receivers.cells.element]
         sampled = (count > 0)[:, None] & (receivers.cells.barycentric.max(axis=1) > 0)
         self.measured = self._scatter(sampled) > 0
+        self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
         vertex, jump, weight = gradient_jumps(receivers, self.measured)
         penalty = weight[:, None, None] * jump[:, :, None] * jump[:, None, :]
         row = np.concatenate([self._corner[:, _ROW], self._corner[:, _COLUMN[3:]]], axis=1).ravel()
@@ -183,21 +183,20 @@ class Fit:
         return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count).astype(np.float64)
 
     def fill(self, values: Float64) -> Float64:
-        """Give vertices that no valid sample touched the mean of their neighbours, for a few rings from what is known.
-
-        Farther inside a solid the light is what it truly is there: none.
-        """
-        known = self.measured.copy()
+        """Give vertices without a sample the mean of their neighbours, ring by ring; but not those that lie in the
+        dark inside of a solid, where there is no light and nobody looks."""
+        known = self.measured | self.hidden
         corners = self._receivers.corner_vertex
         one, two = corners.ravel(), corners[:, [1, 2, 0]].ravel()
         one, two = np.concatenate([one, two]), np.concatenate([two, one])
-        for _ in range(FILLED_RINGS):
-            edge = known[one] & ~known[two]
+        edge = self.measured[one] & ~known[two]
+        while edge.any():
             share = np.bincount(two[edge], minlength=self._count)
             total = [np.bincount(two[edge], v[one[edge]], self._count) for v in values.T]
             fresh = share > 0
             values[fresh] = (np.stack(total, axis=1) / np.maximum(share, 1)[:, None])[fresh]
             known |= fresh
+            edge = fresh[one] & ~known[two]
         return values
 
 

@@ -27,7 +27,7 @@ class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
     reflected, emitted, lamps (v, 3); open_sky (v,) share of the hemisphere; error; cell_error (c,) mean square of each
-    cell's radiance error; unfilled: vertices that no sample could be taken at.
+    cell's radiance error; hidden: vertices inside solids, which stay dark.
     """
 
     reflected: Float64
@@ -36,7 +36,7 @@ class Light:
     lamps: Float64
     error: ErrorEstimate
     cell_error: Float64
-    unmeasured: int
+    hidden: int
 
 
 def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, workers: Workers, clock: Clock) -> Light:
@@ -82,7 +82,7 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
     receivers, around = survey.receivers, survey.surroundings
     cells = receivers.cells
-    fit = Fit(receivers, survey.valid_samples)
+    fit = Fit(receivers, survey.valid_samples, survey.invalid)
     sampled = [survey.direct, survey.indirect] if around else [survey.direct]
     fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area), len(sampled), 1))
     dark = np.zeros((receivers.vertices, 3))
@@ -107,7 +107,7 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
         lamps=fits[0].values[:, :3],
         error=error,
         cell_error=cell_error,
-        unmeasured=int(np.count_nonzero(~fit.measured)),
+        hidden=int(np.count_nonzero(fit.hidden)),
     )
 
 

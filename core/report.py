@@ -69,10 +69,6 @@ def _warnings(settings: Settings, light: Light) -> list[str]:
             f"The estimated error is {light.error.total:.1%}, more than the {settings.error:.1%} asked for; most of it "
             f"is {cause}: {remedy}."
         )
-    if light.unmeasured:
-        warnings.append(
-            f"{light.unmeasured} vertices lie inside solid objects; they were filled from their neighbours."
-        )
     return warnings
 
 

@@ -133,32 +133,39 @@ def _templates(count: np.ndarray, vertices: Float64, six: Int32) -> list[tuple[n
 
 
 def edge_for_count(vertices: list[Float64], triangles: list[Int32], wanted: int) -> float:
-    """The longest edge (metres) at which the meshes together split into about `wanted` triangles.
+    """The longest edge (metres) at which about `wanted` triangles of that size would cover the meshes.
 
-    The count jumps by two or four where many edges have the same length, so it is met within a factor of two at worst.
+    Triangles that are smaller already count by their share of a full one, so that one dense mesh among coarse ones does
+    not use up what all are to share. The count jumps by two or four where many edges have the same length, so it is met
+    within a factor of two at worst.
     """
-    edges, area = _edges_and_area(vertices, triangles)
-    guess = 2.0 * np.sqrt(area / max(wanted, 1))
-    # The nearest to the guess first: where the input is denser than wanted, every size gives the same count.
+    edges, areas = _edges_and_areas(vertices, triangles)
+    guess = 2.0 * np.sqrt(areas.sum() / max(wanted, 1))
     candidates = guess * 2.0 ** np.array(sorted(np.linspace(-2, 2, 33), key=abs))
-    counts = np.array([_count(edges, size) for size in candidates])
+    counts = np.array([_full_sized(edges, areas, size) for size in candidates])
     return float(candidates[np.argmin(np.abs(np.log(counts / wanted)))])
 
 
 def predicted_count(vertices: list[Float64], triangles: list[Int32], longest_edge: float) -> int:
     """About how many triangles the meshes together split into."""
-    return int(_count(_edges_and_area(vertices, triangles)[0], longest_edge))
+    return int(_children(_edges_and_areas(vertices, triangles)[0], longest_edge).sum())
 
 
-def _edges_and_area(vertices: list[Float64], triangles: list[Int32]) -> tuple[Float64, float]:
-    """Edge lengths (t, 3) of all triangles, and their area."""
+def _edges_and_areas(vertices: list[Float64], triangles: list[Int32]) -> tuple[Float64, Float64]:
+    """Edge lengths (t, 3) and areas (t,) of all triangles."""
     corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2), float(np.linalg.norm(cross, axis=1).sum()) / 2
+    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2), np.linalg.norm(cross, axis=1) / 2
 
 
-def _count(edges: Float64, size: float) -> float:
-    """Triangles after splitting, from the number of halvings of each edge: exact for three equal depths."""
+def _full_sized(edges: Float64, areas: Float64, size: float) -> float:
+    """Triangles after splitting, small ones counted by their share of a right-angled one with the longest edge."""
+    children = _children(edges, size)
+    return max(float(np.where(children > 1, children, np.minimum(areas / (size * size / 4), 1.0)).sum()), 1e-9)
+
+
+def _children(edges: Float64, size: float) -> Float64:
+    """Triangles that each splits into, from the number of halvings of its edges: exact for three equal depths."""
     depth = np.maximum(np.ceil(np.log2(np.maximum(edges, 1e-300) / size) - 1e-9), 0.0)
     depth.sort(axis=1)
-    return float(np.sum(2.0 ** (depth[:, 2] + depth[:, 1])))
+    return 2.0 ** (depth[:, 2] + depth[:, 1])

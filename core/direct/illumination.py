@@ -53,10 +53,11 @@ class DirectLight:
             halves = 2 if light.sized else 1
             per_half = max(1, rays // 2) if light.sized else 1
             unit = _lattices(len(lit), halves, per_half, rng)
-            targets, weights = light.aim(points[lit], shading[lit], unit.reshape(len(lit), -1, 2))
-            free = self._free(points[lit], normals[lit], origins[lit], targets, weights)
+            targets, weights, gain = light.aim(points[lit], shading[lit], unit.reshape(len(lit), -1, 2))
+            free = self._free(points[lit], normals[lit], origins[lit], targets, weights * gain)
             cast += free.size
-            visible = _weighted_share(free.reshape(-1, halves, per_half), weights.reshape(-1, halves, per_half))
+            shape = (-1, halves, per_half)
+            visible = _weighted_mean((free * gain).reshape(shape), weights.reshape(shape))
             arriving = (share[lit, None] * visible)[:, :, None] * light.color
             irradiance[lit] += arriving.mean(axis=1)
             if halves == 2:
@@ -83,7 +84,7 @@ def _lattices(points: int, halves: int, count: int, rng: np.random.Generator) ->
     return np.asarray((lattice + rng.random((points, halves, 1, 2))) % 1.0)
 
 
-def _weighted_share(free: Bool, weights: Float64) -> Float64:
-    """(n, halves): the share of the weight (n, halves, r) that is free."""
+def _weighted_mean(values: Float64, weights: Float64) -> Float64:
+    """(n, halves): the mean of values (n, halves, r) by their weights."""
     total = weights.sum(axis=2)
-    return np.asarray(np.divide((weights * free).sum(axis=2), total, out=np.zeros_like(total), where=total > 0))
+    return np.divide((weights * values).sum(axis=2), total, out=np.zeros_like(total), where=total > 0)

@@ -2,8 +2,10 @@
 
 Every lamp answers two questions, for points in the unit box:
 - `unoccluded(points, normals)`: the share of its light that arrives, (n,), so that irradiance = share * colour;
-- `aim(points, normals, unit)`: targets (n, r, 3) spread over the lamp, and the weight (n, r) of the light from each.
-Irradiance is colour * share * (weight of the free targets / weight of all): exact wherever no target is blocked.
+- `aim(points, normals, unit)`: targets (n, r, 3) spread over the lamp, the weight (n, r) of the light from each if the
+  lamp shone alike in all directions, and the gain (n, r), how much of that it really sends this way.
+Irradiance is colour * share * (sum of weight * gain of the free targets / sum of all weights): exact wherever no target
+is blocked and the lamp shines evenly.
 """
 
 from __future__ import annotations
@@ -24,6 +26,10 @@ _ELLIPSE_CORNERS = 32
 _BEYOND = 8.0
 
 
+#: Targets (n, r, 3), weights (n, r), gains (n, r).
+Aim = tuple[Float64, Float64, Float64]
+
+
 class Light(Protocol):
     """A light source in the unit box. color (3,) float64. sized: whether its shadows are soft."""
 
@@ -33,7 +39,7 @@ class Light(Protocol):
 
     def unoccluded(self, points: Float64, normals: Float64) -> Float64: ...
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> tuple[Float64, Float64]: ...
+    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim: ...
 
 
 def place(lamp: Lamp, space: Space) -> Light:
@@ -85,18 +91,23 @@ class Ball:
         sine = np.where(height > 0, radius / np.sqrt(radius**2 + height**2), 2.0)
         return cap_irradiance(cosine, sine) / self.radius**2
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> tuple[Float64, Float64]:
+    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
         axis, _, radius, height = self._silhouette(points)
         if not self.sized:
             targets = np.broadcast_to(self.position, (len(points), unit.shape[1], 3))
-            return targets, np.ones(unit.shape[:2])
+            return targets, np.ones(unit.shape[:2]), self._gain(points[:, None], targets)
         first, second = perpendicular(axis)
         disc = disc_points(unit) * radius[:, None, None]
         targets = (points + axis * height[:, None])[:, None]
         targets = targets + disc[..., :1] * first[:, None] + disc[..., 1:] * second[:, None]
         towards = targets - points[:, None]
         squared = np.einsum("nrk,nrk->nr", towards, towards)
-        return targets, cosines(towards, normals) * height[:, None] / np.maximum(squared, 1e-30) ** 1.5
+        weights = cosines(towards, normals) * height[:, None] / np.maximum(squared, 1e-30) ** 1.5
+        return targets, weights, self._gain(points[:, None], targets)
+
+    def _gain(self, points: Float64, targets: Float64) -> Float64:
+        """What the lamp sends from targets (n, r, 3) to points (n, 1, 3), relative to a lamp that shines evenly."""
+        return np.ones(targets.shape[:2])
 
     def _silhouette(self, points: Float64) -> tuple[Float64, Float64, Float64, Float64]:
         """Unit axis (n, 3) and distance (n,) to the lamp; radius (n,) and height (n,) of the disc it looks like."""
@@ -119,14 +130,7 @@ class Spot(Ball):
         self.cosine = np.cos(lamp.cone_angle / 2)
         self.softness = max((1.0 - self.cosine) * lamp.blend, 1e-6)
 
-    def unoccluded(self, points: Float64, normals: Float64) -> Float64:
-        return super().unoccluded(points, normals) * self._cone(points, self.position)
-
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> tuple[Float64, Float64]:
-        targets, weights = super().aim(points, normals, unit)
-        return targets, weights * self._cone(points[:, None], targets)
-
-    def _cone(self, points: Float64, targets: Float64) -> Float64:
+    def _gain(self, points: Float64, targets: Float64) -> Float64:
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
         local = (points - targets) @ np.linalg.inv(self.axes)
         depth = -local[..., 2] / np.maximum(np.linalg.norm(local, axis=-1), 1e-30)
@@ -152,19 +156,22 @@ class Sun:
         sine = self.tangent / np.sqrt(1.0 + self.tangent**2)
         return cap_irradiance(cosine, np.full(len(points), sine)) / sine**2
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> tuple[Float64, Float64]:
+    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
         directions = self.axis + self.tangent * (disc_points(unit) @ self.frame)
-        return points[:, None] + _BEYOND * directions, cosines(directions, normals)
+        return points[:, None] + _BEYOND * directions, cosines(directions, normals), np.ones(unit.shape[:2])
 
 
 class Panel:
     """A flat convex polygon that emits alike over its area: an area lamp, or a triangle of an emitting surface."""
 
-    def __init__(self, name: str, corners: Float64, radiance: Float64, two_sided: bool) -> None:
+    def __init__(
+        self, name: str, corners: Float64, radiance: Float64, *, two_sided: bool, spread: float = np.pi
+    ) -> None:
         self.name = name
         self.corners = corners
         self.color = np.pi * radiance
         self.two_sided = two_sided
+        self.half_spread = spread / 2
         self.sized = True
         normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
         self.normal = normal / np.linalg.norm(normal)
@@ -181,18 +188,28 @@ class Panel:
         if np.cross(half_u, half_v) @ np.array(lamp.normal) < 0:
             outline = outline[::-1]
         corners = space.normalise(np.array(lamp.center)) + outline @ np.stack([half_u, half_v])
-        return cls(lamp.name, corners, np.array(lamp.radiance), two_sided=False)
+        return cls(lamp.name, corners, np.array(lamp.radiance), two_sided=False, spread=lamp.spread)
 
     def unoccluded(self, points: Float64, normals: Float64) -> Float64:
         return polygon_irradiance(points, normals, self.corners, two_sided=self.two_sided)
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> tuple[Float64, Float64]:
+    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
         targets = self._spread(unit)
         towards = targets - points[:, None]
         squared = np.einsum("nrk,nrk->nr", towards, towards)
         behind = -np.einsum("nrk,k->nr", towards, self.normal)
         facing = np.abs(behind) if self.two_sided else np.maximum(behind, 0.0)
-        return targets, cosines(towards, normals) * facing / np.maximum(squared, 1e-30) ** 1.5
+        weights = cosines(towards, normals) * facing / np.maximum(squared, 1e-30) ** 1.5
+        return targets, weights, self._gain(facing / np.sqrt(np.maximum(squared, 1e-30)))
+
+    def _gain(self, cosine: Float64) -> Float64:
+        """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
+        (tan h - tan a) / (tan h - h), as Cycles does it; cosine is that of a."""
+        if self.half_spread >= np.pi / 2 - 1e-6:
+            return np.ones_like(cosine)
+        edge = np.tan(self.half_spread)
+        tangent = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / np.maximum(cosine, 1e-9)
+        return np.maximum(edge - tangent, 0.0) / (edge - self.half_spread)
 
     def _spread(self, unit: Float64) -> Float64:
         """Points (n, r, 3) of the polygon, uniform, from points (n, r, 2) of the unit square."""
