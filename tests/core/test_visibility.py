@@ -1,0 +1,90 @@
+"""Rays find what is first, end short of their target, and leak through nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.sampling import triangle_points
+from radiosity_baker.core.visibility import OFFSET, Visibility, offset_along
+
+
+def single(*rows):
+    return np.array(rows, dtype=np.float32)
+
+
+def corners_of(*objects):
+    return np.concatenate([o.vertices[o.triangles] for o in objects])
+
+
+@pytest.fixture
+def layers(build):
+    """Three squares over each other, at z = 0, 0.5 and 1; triangles 0-1, 2-3, 4-5."""
+    return Visibility(corners_of(*(build.quad(corner=(0, 0, z)) for z in (0, 0.5, 1))))
+
+
+def test_the_first_triangle_on_the_way_is_met(layers):
+    down, up = single([0, 0, -1]), single([0, 0, 1])
+    assert layers.nearest(single([0.7, 0.2, 2]), down).tolist() == [4]
+    assert layers.nearest(single([0.2, 0.7, 0.75]), down).tolist() == [3]
+    assert layers.nearest(single([0.7, 0.2, 0.25]), up).tolist() == [2]
+    assert layers.nearest(single([0.7, 0.2, 2]), up).tolist() == [-1]
+
+
+def test_escape_is_a_ray_that_meets_nothing(layers):
+    origins, directions = single([0.7, 0.2, 2], [0.7, 0.2, 0.25]), single([0, 0, 1], [0, 0, 1])
+    assert layers.escapes(origins, directions).tolist() == [True, False]
+
+
+def test_a_segment_is_blocked_by_what_is_between_its_ends_only(layers):
+    origins = single([0.7, 0.2, 0.1], [0.7, 0.2, 0.1], [0.7, 0.2, 0.6], [2, 0.2, 0.1])
+    targets = single([0.7, 0.2, 0.4], [0.7, 0.2, 0.6], [0.7, 0.2, 0.9], [2, 0.2, 5])
+    assert layers.unblocked(origins, targets).tolist() == [True, False, True, True]
+
+
+def test_a_target_on_a_surface_is_not_hidden_by_that_surface(layers):
+    origins = single([0.7, 0.2, 0.1], [0.3, 0.2, 0.9])
+    targets = single([0.3, 0.4, 0.5], [0.6, 0.1, 0.5])
+    assert layers.unblocked(origins, targets).all()
+
+
+def test_rays_do_not_run_into_the_surface_they_leave():
+    """Any plane through the unit box, rounded to single precision: half an ulp of each corner and of the origin, less
+    than six units in the last place together, tilted by at most the triangle's height; the offset is sixty."""
+    rng = np.random.default_rng(3)
+    corners = rng.uniform(-1, 1, (300, 3, 3))
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals /= length
+    fat = length[:, 0] > 0.2
+    for triangle, normal in zip(corners[fat], normals[fat], strict=True):
+        weights = triangle_points(rng.random((200, 2)))
+        directions = rng.normal(size=(200, 3))
+        height = directions @ normal
+        directions += (np.abs(height) - height)[:, None] * normal
+        origins = offset_along(weights @ triangle, np.tile(normal, (200, 1)))
+        assert Visibility(triangle[None]).escapes(origins, directions.astype(np.float32)).all()
+
+
+def test_the_offset_is_along_the_normal():
+    moved = offset_along(np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]]))
+    assert moved.dtype == np.float32
+    assert moved[0].tolist() == [0, 0, pytest.approx(OFFSET)]
+
+
+@pytest.mark.parametrize("level", [0, 3])
+def test_a_closed_surface_leaks_nothing(build, level):
+    """Half a million rays from everywhere inside, to everywhere."""
+    ball = build.sphere(level=level)
+    visibility = Visibility(corners_of(ball))
+    rng = np.random.default_rng(4)
+    origins = rng.uniform(-0.3, 0.3, (250_000, 3)).astype(np.float32)
+    directions = rng.normal(size=origins.shape).astype(np.float32)
+    assert not visibility.escapes(origins, directions).any()
+    assert visibility.nearest(origins, directions).min() >= 0
+
+
+def test_two_scenes_do_not_share_triangles(build, layers):
+    other = Visibility(corners_of(build.quad(corner=(5, 5, 5))))
+    assert other.nearest(single([0.7, 0.2, 2]), single([0, 0, -1])).tolist() == [-1]
+    assert layers.nearest(single([0.7, 0.2, 2]), single([0, 0, -1])).tolist() == [4]
