@@ -201,7 +201,10 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
 
     def last_plan(self) -> dict[str, Any]:
         """The plan made since the last bake, or else what that bake simulated; empty before either."""
-        return _parsed(self.plan or self.report or "{}")
+        if self.plan:
+            return _parsed(self.plan)
+        report = self.last_report()
+        return {} if report is None else {"effects": report["effects"]}
 
 
 @lru_cache(maxsize=4)

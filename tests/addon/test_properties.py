@@ -81,5 +81,5 @@ def test_plan_is_shown_until_a_bake_is_done(asked):
     assert asked.last_plan() == {}
     asked.plan = '{"seconds": 3.0}'
     assert asked.last_plan() == {"seconds": 3.0}
-    asked.remember({"objects": [], "effects": []})
-    assert asked.last_plan()["effects"] == []
+    asked.remember({"objects": [], "effects": [], "seconds": {"total": 2.0}})
+    assert asked.last_plan() == {"effects": []}
