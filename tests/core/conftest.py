@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
-from radiosity_baker.core.patches import Patches, make_patches, unit_space
-from radiosity_baker.core.plan import Effort
 from radiosity_baker.core.parallel import Workers
+from radiosity_baker.core.patches import Patches, make_patches, unit_space
+from radiosity_baker.core.plan import Effort, choose_effort
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import AreaLamp, Scene, SceneObject, Surface
+from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.transport import Transport, make_transport
 from radiosity_baker.core.visibility import Visibility
 
@@ -87,20 +89,9 @@ def furnished_room(albedo=0.7) -> Scene:
 
 
 def effort(**changes) -> Effort:
-    """That of a preview, with changes."""
-    usual = {
-        "estimator": "hemisphere",
-        "patches": 500,
-        "transport_rays": 64,
-        "shadow_rays": 4,
-        "gather_rays": 32,
-        "passes": 4,
-        "boundary_passes": 4,
-        "tolerance": 1e-5,
-        "threshold": 0.0,
-        "emitters_by_rays": False,
-    }
-    return Effort(**(usual | changes))
+    """The usual effort, on fewer patches, solved to rounding and with nothing culled, with changes."""
+    usual = choose_effort(furnished_room(), Settings())
+    return replace(usual, **({"patches": 500, "tolerance": 1e-6, "threshold": 0.0} | changes))
 
 
 def patches_of(scene: Scene, wanted: int) -> Patches:

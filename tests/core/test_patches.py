@@ -22,7 +22,7 @@ def scene(build) -> Scene:
     """A striped wall, a dense ball and a block, away from the origin."""
     wall = build.quad("wall", (10, 0, 0), (8, 0, 0), (0, 0, 4), surface=[0, 1])
     ball = build.sphere("ball", level=4, surface=np.arange(2048) % 2)
-    ball = SceneObject("ball", ball.vertices + [14, 3, 2], ball.triangles, ball.surface)
+    ball = SceneObject("ball", ball.vertices + np.array([14, 3, 2]), ball.triangles, ball.surface)
     return Scene((wall, ball, build.box("block", (10, 1, 0), (12, 3, 1), surface=2)), SURFACES)
 
 
@@ -141,7 +141,7 @@ def test_shading_normals_are_interpolated_unit_vectors():
     receiver = smooth([lean, (0, 0, 1), (0, 0, 1)])
     weights = np.array([[[1, 0, 0], [0.5, 0.5, 0], [0, 0.5, 0.5]]])
     shaded = shading_normals(receiver, np.zeros(1, np.int32), weights, np.array([[0.0, 0, 1]]))
-    between = (lean + [0, 0, 1]) / np.linalg.norm(lean + [0, 0, 1])
+    between = (lean + shaded[0, 2]) / np.linalg.norm(lean + shaded[0, 2])
     assert shaded[0] == pytest.approx(np.array([lean, between, [0, 0, 1]]), abs=1e-6)
 
 
