@@ -58,7 +58,7 @@ def test_entries_of_one_place_add_up() -> None:
 def test_no_entries_at_all() -> None:
     rows = Rows.from_triplets([], [], [], 3)
     assert rows.apply(np.ones((5, 2))).tolist() == [[0, 0]] * 3
-    assert len(balance(rows, np.ones(3)).columns) == 0
+    assert (balance(rows, np.ones(3)).weights == 0).all()
 
 
 def test_stack_and_renumber() -> None:
@@ -104,6 +104,23 @@ def test_balance_closes_a_noisy_box(seed: int, noise: float) -> None:
     assert balanced.row_sums() == pytest.approx(area, rel=2e-6)
     assert (balanced.row_sums() <= area * (1 + 1e-7)).all()
     assert (dense(balanced, 25) == dense(balanced, 25).T).all()
+
+
+@settings(max_examples=50, deadline=None)
+@given(seed=st.integers(0, 10**6), noise=st.floats(0.0, 0.9))
+def test_balance_closes_exactly_what_scaling_cannot(seed: int, noise: float) -> None:
+    """A small patch alone among large ones: no scaling fills its row and theirs at once, the diagonal does."""
+    exact, area = closed_box(seed, 25)
+    exact[0, 2:] = exact[2:, 0] = 0.0
+    exact[0, 0] = 0.0
+    target = np.where(np.arange(25) == 0, 40.0, area)
+    wrong = 1 + noise * np.random.default_rng(seed).uniform(-1, 1, exact.shape)
+    balanced = balance(sparse(exact * (wrong + wrong.T) / 2), target)
+    weights = dense(balanced, 25)
+    assert weights.sum(1) == pytest.approx(target, rel=1e-6)
+    assert (weights == weights.T).all()
+    assert (weights >= 0).all()
+    assert weights[0, 0] > 0.9 * (target[0] - area[1])
 
 
 @settings(max_examples=100, deadline=None)
