@@ -12,16 +12,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .direct.illumination import DirectLight
+from .direct.lamps import Light
 from .gather import Points, gather_direct, gather_indirect
 from .parallel import Workers
+from .patches import Cells, Patches, PatchMeshes, Space, make_patches, split_objects
+from .plan import Effort
 from .receivers import Receivers, split_cells
 from .sampling import stream
-from .scene import Bool, Float64
+from .scene import Bool, Float64, Scene
 from .survey import Surroundings, inside_solid
-from .tessellation import Int64
+from .tessellation import Int64, split_triangles
+from .visibility import Visibility
 
-#: How often a cell is split into four at most.
-LEVELS = 3
+#: How often a cell, and a patch, is split into four at most.
+LEVELS, PATCH_LEVELS = 6, 4
+#: How far light may jump inside a patch, relative to the mean: what patches send out is blurred by distance.
+_PATCH_STEP = 0.5
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
 #: lamp with size.
 _POINTS, _RAYS, _SHADOW_RAYS = 4, 8, 4
@@ -47,62 +53,70 @@ class _Probe:
         return np.asarray(differs | (np.ptp(self.hidden.astype(np.int8), axis=0) > 0))
 
     def step(self, mean: float) -> Float64:
-        """(n,) how far the light jumps inside each cell, beyond what noise does; at a contact by as much as is common."""
+        """(n,) how far light jumps inside each cell, beyond what noise does; at a contact by more than is common."""
         contact = np.ptp(self.hidden.astype(np.int8), axis=0) > 0
         jump = np.ptp(self.direct, axis=0) - _SIGNIFICANT * np.sqrt(self.variance.mean(axis=0))
-        return np.maximum(jump, np.where(contact, mean, 0.0))
+        return np.maximum(jump, np.where(contact, 2.0 * mean, 0.0))
 
 
 class Adaptation:
-    """Splits the cells of receivers; limit: how many there may be; error: relative, that the boundaries may bring."""
+    """Splits triangles along the boundaries of light; without surroundings only shadows are looked for."""
 
-    def __init__(
-        self,
-        direct_light: DirectLight,
-        around: Surroundings | None,
-        limit: int,
-        error: float,
-        seed: int,
-        workers: Workers,
-    ) -> None:
+    def __init__(self, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers) -> None:
         self._light = direct_light
         self._around = around and replace(
             around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "contact patterns"))
         )
-        self._limit = limit
-        self._error = error
         self._seed = seed
         self._workers = workers
 
-    def refine(self, receivers: Receivers) -> Receivers:
-        """The receivers with finer cells along the boundaries."""
-        every = np.arange(len(receivers.cells))
-        first = self._probe(receivers, every, 0, 1)
-        mean = float(receivers.cells.area @ first.direct[0] / receivers.cells.area.sum())
-        # Boundaries may be short: what a cell contributes to the squared error of all is compared with its fair share.
-        fair = (7.0 * self._error * mean) ** 2 * receivers.cells.area.sum() / len(every)
+    def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
+        """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
+        first = self._probe(receivers.cells, np.arange(len(receivers.cells)), 0, 1)
         fresh = _on_borders(receivers, first)
+        mean, fair = _fair_share(receivers.cells.area, first.direct[0], 7.0 * error)
         for level in range(LEVELS):
-            if not len(fresh):
+            split = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit)
+            if not split.any():
                 break
-            probe = self._probe(receivers, fresh, 1 + level, _POINTS)
-            weight = np.where(probe.crossed(), probe.step(mean) ** 2 * receivers.cells.area[fresh], 0.0)
-            # A split cell becomes four, and makes its neighbours become two or three.
-            most = max((self._limit - len(receivers.cells)) // 5, 0)
-            chosen = fresh[np.argsort(-weight, kind="stable")[: min(most, int(np.count_nonzero(weight > fair)))]]
-            if not len(chosen):
-                break
-            split = np.zeros(len(receivers.cells), dtype=bool)
-            split[chosen] = True
             receivers, source = split_cells(receivers, split)
             fresh = np.flatnonzero(split[source])
         return receivers
 
-    def _probe(self, receivers: Receivers, chosen: Int64, number: int, count: int) -> _Probe:
-        shift = stream(self._seed, f"adaptation {number}").random((len(receivers.cells), 2))
+    def refine_patches(self, scene: Scene, patches: Patches, split: PatchMeshes, limit: int) -> PatchMeshes:
+        """The patch meshes with at most about `limit` triangles, finer where direct light breaks."""
+        for level in range(PATCH_LEVELS):
+            cells = patches.as_cells()
+            own = np.flatnonzero(np.bincount(patches.patch)[patches.patch] == 1)
+            light = self._probe(cells, own, 50 + level, 1).direct[0]
+            mean, fair = _fair_share(cells.area[own], light, _PATCH_STEP)
+            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit)[own]]
+            if not len(chosen):
+                break
+            marked = np.zeros(sum(len(m.triangles) for m in split.meshes), dtype=bool)
+            marked[patches.triangle[chosen]] = True
+            ends = np.cumsum([len(m.triangles) for m in split.meshes])[:-1]
+            parts = zip(split.meshes, np.split(marked, ends), strict=True)
+            split = replace(split, meshes=tuple(split_triangles(mesh, part)[0] for mesh, part in parts))
+            patches = make_patches(scene, patches.space, split)
+        return split
+
+    def _worst(self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int) -> Bool:
+        """Which cells (c,) to split: of the fresh ones those with the largest squared error, while there is room."""
+        split = np.zeros(len(cells), dtype=bool)
+        if len(fresh):
+            probe = self._probe(cells, fresh, number, _POINTS)
+            weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
+            # A split cell becomes four, and makes its neighbours become two or three.
+            most = min(max((limit - len(cells)) // 5, 0), int(np.count_nonzero(weight > fair)))
+            split[fresh[np.argsort(-weight, kind="stable")[:most]]] = True
+        return split
+
+    def _probe(self, cells: Cells, chosen: Int64, number: int, count: int) -> _Probe:
+        shift = stream(self._seed, f"adaptation {number}").random((len(cells), 2))
         seen = []
         for k in range(count):
-            points = Points(receivers.cells, chosen, k, shift)
+            points = Points(cells, chosen, k, shift)
             streams = _FIRST_STREAM + 100 * number + k
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
             direct = light.irradiance.mean(axis=1)
@@ -115,6 +129,24 @@ class Adaptation:
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
+
+
+def patches_by_light(
+    scene: Scene, space: Space, lights: list[Light], effort: Effort, seed: int, workers: Workers
+) -> tuple[Patches, Visibility]:
+    """Patches that are finer where direct light breaks, and what is visible among them."""
+    split = split_objects(scene, effort.patches)
+    patches = make_patches(scene, space, split)
+    adaptation = Adaptation(DirectLight(lights, Visibility(patches.corners), seed), None, seed, workers)
+    patches = make_patches(scene, space, adaptation.refine_patches(scene, patches, split, 2 * effort.patches))
+    return patches, Visibility(patches.corners)
+
+
+def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:
+    """Mean of the light (n,), and the squared error times area that is each cell's share when the root mean square
+    over all may be `relative` to that mean."""
+    mean = float(area @ light / area.sum())
+    return mean, (relative * mean) ** 2 * float(area.sum()) / len(area)
 
 
 def _on_borders(receivers: Receivers, probe: _Probe) -> Int64:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .adaptation import Adaptation
+from .adaptation import Adaptation, patches_by_light
 from .check import check_scene
 from .clock import Clock
 from .direct.emitters import emitting_panels
@@ -12,7 +12,7 @@ from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .layers import baked_objects
 from .parallel import Workers
-from .patches import make_patches, unit_space
+from .patches import unit_space
 from .plan import plan
 from .progress import Progress
 from .receivers import make_receivers
@@ -23,7 +23,6 @@ from .scene import Scene
 from .settings import Settings
 from .survey import Survey, look_up
 from .transport import solve_halves
-from .visibility import Visibility
 
 
 def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> BakeResult:
@@ -40,18 +39,16 @@ def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> 
         with clock.stage("tessellate", 0.03):
             space = unit_space(scene)
             receivers = make_receivers(scene, space, settings)
-            patches = make_patches(scene, space, effort.patches)
-        with clock.stage("visibility", 0.08):
-            visibility = Visibility(patches.corners)
             lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
+            patches, visibility = patches_by_light(scene, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
             limit = 2 * max(len(receivers.cells), settings.triangles)
-            adaptation = Adaptation(direct_light, surroundings, limit, effort.error, settings.seed, workers)
-            receivers = adaptation.refine(receivers)
+            adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
+            receivers = adaptation.refine_receivers(receivers, limit, effort.error)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
         light = refine(survey, scene, settings, effort, workers, clock)
     with clock.stage("layers", 0.97):

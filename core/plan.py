@@ -9,7 +9,7 @@ from time import perf_counter
 import numpy as np
 
 from .parallel import thread_count
-from .patches import Space, make_patches, triangle_geometry, unit_space
+from .patches import Space, make_patches, split_objects, triangle_geometry, unit_space
 from .result import Effect
 from .sampling import stream
 from .scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp
@@ -157,7 +157,7 @@ def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[float, fl
 
 
 def _seconds_per_ray(scene: Scene, space: Space) -> float:
-    patches = make_patches(scene, space, 2048)
+    patches = make_patches(scene, space, split_objects(scene, 2048))
     visibility = Visibility(patches.corners)
     rng = stream(0, "calibration")
     chosen = rng.integers(len(patches.area), size=_CALIBRATION_RAYS)

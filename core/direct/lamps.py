@@ -95,7 +95,7 @@ class Ball:
         axis, _, radius, height = self._silhouette(points)
         if not self.sized:
             targets = np.broadcast_to(self.position, (len(points), unit.shape[1], 3))
-            return targets, np.ones(unit.shape[:2]), self._gain(points[:, None], targets)
+            return targets, np.ones(unit.shape[:2]), self._gain(targets - points[:, None])
         first, second = perpendicular(axis)
         disc = disc_points(unit) * radius[:, None, None]
         targets = (points + axis * height[:, None])[:, None]
@@ -103,11 +103,11 @@ class Ball:
         towards = targets - points[:, None]
         squared = np.einsum("nrk,nrk->nr", towards, towards)
         weights = cosines(towards, normals) * height[:, None] / np.maximum(squared, 1e-30) ** 1.5
-        return targets, weights, self._gain(points[:, None], targets)
+        return targets, weights, self._gain(targets - points[:, None])
 
-    def _gain(self, points: Float64, targets: Float64) -> Float64:
-        """What the lamp sends from targets (n, r, 3) to points (n, 1, 3), relative to a lamp that shines evenly."""
-        return np.ones(targets.shape[:2])
+    def _gain(self, towards: Float64) -> Float64:
+        """What the lamp sends against the directions (n, r, 3) from the points, relative to one that shines evenly."""
+        return np.ones(towards.shape[:2])
 
     def _silhouette(self, points: Float64) -> tuple[Float64, Float64, Float64, Float64]:
         """Unit axis (n, 3) and distance (n,) to the lamp; radius (n,) and height (n,) of the disc it looks like."""
@@ -130,10 +130,10 @@ class Spot(Ball):
         self.cosine = np.cos(lamp.cone_angle / 2)
         self.softness = max((1.0 - self.cosine) * lamp.blend, 1e-6)
 
-    def _gain(self, points: Float64, targets: Float64) -> Float64:
+    def _gain(self, towards: Float64) -> Float64:
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
-        local = (points - targets) @ np.linalg.inv(self.axes)
-        depth = -local[..., 2] / np.maximum(np.linalg.norm(local, axis=-1), 1e-30)
+        local = towards @ np.linalg.inv(self.axes)
+        depth = local[..., 2] / np.maximum(np.linalg.norm(local, axis=-1), 1e-30)
         step = np.clip((depth - self.cosine) / self.softness, 0.0, 1.0)
         return step * step * (3.0 - 2.0 * step)
 
