@@ -11,7 +11,7 @@ import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import Patches, make_patches, unit_space
+from radiosity_baker.core.patches import Patches, make_patches, split_objects, unit_space
 from radiosity_baker.core.plan import Effort, choose_effort
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import AreaLamp, Scene, SceneObject, Surface
@@ -95,7 +95,7 @@ def effort(**changes) -> Effort:
 
 
 def patches_of(scene: Scene, wanted: int) -> Patches:
-    return make_patches(scene, unit_space(scene), wanted)
+    return make_patches(scene, unit_space(scene), split_objects(scene, wanted))
 
 
 @pytest.fixture(scope="session")

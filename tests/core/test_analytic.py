@@ -11,7 +11,7 @@ from radiosity_baker.core.form_factors.pairs import Estimate, Faces
 from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 from radiosity_baker.core.form_factors.rows import balance, symmetric_exchange
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import make_patches, triangle_geometry, unit_space
+from radiosity_baker.core.patches import make_patches, split_objects, triangle_geometry, unit_space
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.sampling import triangle_points
 from radiosity_baker.core.scene import Scene, SceneObject, Surface
@@ -45,7 +45,7 @@ def square(name: str, size: float, z: float, surface: int, *, up: bool) -> Scene
 def estimate(*objects: SceneObject, wanted: int, threshold: float = 0.0, threads: int = 1, seed: int = 1) -> Estimate:
     """Surfaces 0, 1, 2 have the red albedos 0, 0.25, 0.5, by which the patches are told apart."""
     scene = Scene(objects, tuple(Surface(f"s{k}", (k / 4, 0.5, 0.5)) for k in range(3)))
-    patches = make_patches(scene, unit_space(scene), wanted)
+    patches = make_patches(scene, unit_space(scene), split_objects(scene, wanted))
     with Workers(threads, Progress()) as workers:
         return analytic_rows(
             patches, Visibility(patches.corners), workers, threshold=threshold, seed=seed, purpose="test"

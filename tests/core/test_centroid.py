@@ -8,7 +8,7 @@ import pytest
 from radiosity_baker.core.form_factors.centroid import centroid_rows, quarters_share
 from radiosity_baker.core.form_factors.pairs import Estimate, Faces
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import make_patches, unit_space
+from radiosity_baker.core.patches import make_patches, split_objects, unit_space
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import Scene, SceneObject, Surface
 from radiosity_baker.core.visibility import Visibility
@@ -21,7 +21,7 @@ INWARD = np.array([[a, c, b] for a, b, c, _ in QUADS] + [[a, d, c] for a, _, c, 
 def estimate(vertices: np.ndarray, triangles: np.ndarray, wanted: int) -> Estimate:
     surface = np.zeros(len(triangles), dtype=np.int32)
     scene = Scene((SceneObject("mesh", vertices, triangles, surface),), (Surface("grey"),))
-    patches = make_patches(scene, unit_space(scene), wanted)
+    patches = make_patches(scene, unit_space(scene), split_objects(scene, wanted))
     with Workers(1, Progress()) as workers:
         return centroid_rows(patches, Visibility(patches.corners), workers, threshold=0.0, seed=0, purpose="test")
 

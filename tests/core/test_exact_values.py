@@ -11,7 +11,7 @@ import pytest
 
 from radiosity_baker.core.form_factors.analytic import analytic_rows
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import make_patches, unit_space
+from radiosity_baker.core.patches import make_patches, split_objects, unit_space
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import Scene, SceneObject, Surface
 from radiosity_baker.core.visibility import Visibility
@@ -26,7 +26,7 @@ def surface_form_factor(first: np.ndarray, second: np.ndarray, wanted: int) -> f
         objects.append(SceneObject(f"polygon {number}", np.asarray(corners, dtype=float), fan, surface))
     # The albedo tells the surfaces apart once they are cut into patches.
     scene = Scene(tuple(objects), (Surface("first", (0.25, 0, 0)), Surface("second", (0.5, 0, 0))))
-    patches = make_patches(scene, unit_space(scene), wanted)
+    patches = make_patches(scene, unit_space(scene), split_objects(scene, wanted))
     with Workers(1, Progress()) as workers:
         estimate = analytic_rows(
             patches, Visibility(patches.corners), workers, threshold=0.0, seed=0, purpose="exact values"

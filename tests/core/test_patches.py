@@ -7,7 +7,6 @@ import pytest
 
 from radiosity_baker.core.patches import (
     coarser_groups,
-    make_patches,
     shading_normals,
     triangle_geometry,
     unit_space,
@@ -27,8 +26,8 @@ def scene(build) -> Scene:
 
 
 @pytest.fixture(scope="module")
-def patches(scene):
-    return make_patches(scene, unit_space(scene), 600)
+def patches(build, scene):
+    return build.patches(scene, 600)
 
 
 def area_of(scene: Scene, surface: int) -> float:
@@ -88,27 +87,27 @@ def test_members_list_the_triangles_of_each_patch(patches):
 
 
 @pytest.mark.parametrize("wanted", [100, 600, 5000])
-def test_about_as_many_patches_as_wanted(scene, wanted):
+def test_about_as_many_patches_as_wanted(build, scene, wanted):
     """The edge is met within a factor of two in count; grouping by cells and facing adds up to another two."""
-    made = len(make_patches(scene, unit_space(scene), wanted))
+    made = len(build.patches(scene, wanted))
     assert wanted / 2 <= made <= 4 * wanted
 
 
 def test_dense_meshes_are_grouped(build):
     ball = build.sphere(level=5)
-    made = make_patches(scene := Scene((ball,), SURFACES), unit_space(scene), 300)
+    made = build.patches(Scene((ball,), SURFACES), 300)
     assert len(made.area) == 8192
     assert len(made) <= 1200
 
 
 def test_large_triangles_stay_their_own_patches(build):
-    made = make_patches(scene := Scene((build.quad(),), SURFACES), unit_space(scene), 512)
+    made = build.patches(Scene((build.quad(),), SURFACES), 512)
     assert len(made) == len(made.area)
 
 
 def test_triangles_without_area_are_left_out(build):
     line = build.triangles("t", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (2, 0, 0)], [(0, 1, 2), (0, 1, 3), (1, 1, 2)])
-    made = make_patches(scene := Scene((line,), SURFACES), unit_space(scene), 1)
+    made = build.patches(Scene((line,), SURFACES), 1)
     assert made.area.min() > 0
     assert made.area.sum() * made.space.metres**2 == pytest.approx(0.5)
 
@@ -123,7 +122,7 @@ def test_coarser_groups_are_several_times_fewer_and_mix_nothing(build):
     """Of the flat faces of a room: some patches to a group, never of two surfaces, never around an edge."""
     surfaces = tuple(Surface(str(k), (0.1 * (k + 1),) * 3) for k in range(6))
     room = build.box(inward=True, surface=range(6))
-    made = make_patches(scene := Scene((room,), surfaces), unit_space(scene), 3000)
+    made = build.patches(Scene((room,), surfaces), 3000)
     group = coarser_groups(made)
     look = {(g, round(float(a), 4)) for g, a in zip(group, made.albedo[:, 0], strict=True)}
     assert len(look) == group.max() + 1

@@ -54,10 +54,11 @@ def test_flat_shaded_balls_share_nothing(build):
     assert numbered(build.sphere(level=1))[1] == 3 * 32
 
 
-def test_an_edge_that_is_smooth_at_one_end_only_is_hard(build):
+@pytest.mark.parametrize("end", [0, 1])
+def test_an_edge_that_is_smooth_at_one_end_only_is_hard(build, end):
     square = build.quad()
     normals = np.tile([0.0, 0, 1], (2, 3, 1))
-    normals[1, 1] = [0.6, 0, 0.8]  # triangle (0, 2, 3): its corner at vertex 2, an end of the common edge
+    normals[1, end] = [0.6, 0, 0.8]  # triangle (0, 2, 3): its corner at an end of the common edge
     assert fit_vertices(square.triangles, normals, square.surface)[1] == 6
 
 
