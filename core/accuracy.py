@@ -57,8 +57,10 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:
     systems = [fit.system(half) for half in grey]
     lowest, alpha = np.inf, ALPHAS[0]
     residual = spread = np.zeros(len(area))
+    values: list[Float64 | None] = [None, None]
     for candidate in ALPHAS:
-        first, second = (fit.at_corners(fit.solve(system, candidate)) for system in systems)
+        values = [fit.solve(system, candidate, start) for system, start in zip(systems, values, strict=True)]
+        first, second = (fit.at_corners(v) for v in values if v is not None)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first))[:, 0] / 2
         score = float(area @ predicted)
         if score > lowest:

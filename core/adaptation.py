@@ -25,7 +25,7 @@ from .tessellation import Int64, split_triangles
 from .visibility import Visibility
 
 #: How often a cell, and a patch, is split into four at most.
-LEVELS, PATCH_LEVELS = 6, 4
+LEVELS, PATCH_LEVELS = 4, 3
 #: How far light may jump inside a patch, relative to the mean: what patches send out is blurred by distance.
 _PATCH_STEP = 0.5
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
@@ -50,13 +50,16 @@ class _Probe:
     def crossed(self) -> Bool:
         """(n,) cells whose points do not all see the same."""
         differs = (self.signature < 0).any(axis=0) | (np.ptp(self.signature, axis=0) > 0)
-        return np.asarray(differs | (np.ptp(self.hidden.astype(np.int8), axis=0) > 0))
+        return np.asarray(differs | self.contact())
+
+    def contact(self) -> Bool:
+        """(n,) cells that are partly hidden."""
+        return np.asarray(self.hidden.any(axis=0) & ~self.hidden.all(axis=0))
 
     def step(self, mean: float) -> Float64:
-        """(n,) how far light jumps inside each cell, beyond what noise does; at a contact by more than is common."""
-        contact = np.ptp(self.hidden.astype(np.int8), axis=0) > 0
+        """(n,) how far light jumps inside each cell, beyond what noise does; at a contact by as much as is common."""
         jump = np.ptp(self.direct, axis=0) - _SIGNIFICANT * np.sqrt(self.variance.mean(axis=0))
-        return np.maximum(jump, np.where(contact, 2.0 * mean, 0.0))
+        return np.maximum(jump, np.where(self.contact(), mean, 0.0))
 
 
 class Adaptation:
@@ -73,14 +76,16 @@ class Adaptation:
     def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
         """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
         first = self._probe(receivers.cells, np.arange(len(receivers.cells)), 0, 1)
-        fresh = _on_borders(receivers, first)
+        fresh, hidden = _on_borders(receivers, first), first.hidden[0]
         mean, fair = _fair_share(receivers.cells.area, first.direct[0], 7.0 * error)
         for level in range(LEVELS):
-            split = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit)
+            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit)
             if not split.any():
                 break
+            # What is hidden beside a contact must not be coarse either: its dark would reach far, or light reach in.
+            split |= hidden & _touching(receivers, contact)
             receivers, source = split_cells(receivers, split)
-            fresh = np.flatnonzero(split[source])
+            fresh, hidden = np.flatnonzero(split[source]), hidden[source]
         return receivers
 
     def refine_patches(self, scene: Scene, patches: Patches, split: PatchMeshes, limit: int) -> PatchMeshes:
@@ -90,7 +95,7 @@ class Adaptation:
             own = np.flatnonzero(np.bincount(patches.patch)[patches.patch] == 1)
             light = self._probe(cells, own, 50 + level, 1).direct[0]
             mean, fair = _fair_share(cells.area[own], light, _PATCH_STEP)
-            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit)[own]]
+            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit)[0][own]]
             if not len(chosen):
                 break
             marked = np.zeros(sum(len(m.triangles) for m in split.meshes), dtype=bool)
@@ -101,16 +106,20 @@ class Adaptation:
             patches = make_patches(scene, patches.space, split)
         return split
 
-    def _worst(self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int) -> Bool:
-        """Which cells (c,) to split: of the fresh ones those with the largest squared error, while there is room."""
-        split = np.zeros(len(cells), dtype=bool)
+    def _worst(
+        self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int
+    ) -> tuple[Bool, Bool]:
+        """Which cells (c,) to split: of the fresh ones those with the largest squared error, while there is room; and
+        which of them a contact crosses."""
+        split, contact = np.zeros((2, len(cells)), dtype=bool)
         if len(fresh):
             probe = self._probe(cells, fresh, number, _POINTS)
             weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
             # A split cell becomes four, and makes its neighbours become two or three.
             most = min(max((limit - len(cells)) // 5, 0), int(np.count_nonzero(weight > fair)))
             split[fresh[np.argsort(-weight, kind="stable")[:most]]] = True
-        return split
+            contact[fresh[probe.contact()]] = True
+        return split, split & contact
 
     def _probe(self, cells: Cells, chosen: Int64, number: int, count: int) -> _Probe:
         shift = stream(self._seed, f"adaptation {number}").random((len(cells), 2))
@@ -147,6 +156,14 @@ def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, 
     over all may be `relative` to that mean."""
     mean = float(area @ light / area.sum())
     return mean, (relative * mean) ** 2 * float(area.sum()) / len(area)
+
+
+def _touching(receivers: Receivers, chosen: Bool) -> Bool:
+    """Cells (c,) that share a vertex with a chosen one."""
+    corner = receivers.corner_vertex[receivers.cells.element]
+    touched = np.zeros(receivers.vertices, dtype=bool)
+    touched[corner[chosen]] = True
+    return np.asarray(touched[corner].any(axis=1))
 
 
 def _on_borders(receivers: Receivers, probe: _Probe) -> Int64:
