@@ -8,6 +8,7 @@ import json
 from typing import Any
 
 import bpy
+from bpy.app.handlers import persistent
 from bpy.props import StringProperty
 
 from ..core.settings import LAYERS
@@ -66,7 +67,33 @@ def show_layer(scene: bpy.types.Scene, report: dict[str, Any], layer: str) -> No
     for entry in report["objects"]:
         attribute = _layer_of(scene, entry, layer)
         if attribute is not None:
-            scene.objects[entry["name"]].data.color_attributes.active_color_name = attribute.name
+            attribute.id_data.color_attributes.active_color_name = attribute.name
+            attribute.id_data.update_tag()  # Without it, a viewport that has drawn the mesh keeps the old colours.
+
+
+_baked_before_undo = False
+
+
+@persistent
+def _remember_before_undo(scene: bpy.types.Scene, *_: object) -> None:
+    global _baked_before_undo  # noqa: PLW0603 - Blender's handlers have no other place in common
+    _baked_before_undo = _is_baked(scene)
+
+
+@persistent
+def _follow_undo(scene: bpy.types.Scene, *_: object) -> None:
+    """Undo knows no viewports: when it takes the light away the old look comes back, and with a redo the new one."""
+    view = find_view(bpy.context)
+    if view is None or _is_baked(scene) == _baked_before_undo:
+        return
+    if _baked_before_undo and is_shown(bpy.context):
+        restore(view)
+    elif not _baked_before_undo and scene.radiosity_baker.show_when_done:
+        show(view)
+
+
+def _is_baked(scene: bpy.types.Scene) -> bool:
+    return scene.radiosity_baker.last_report() is not None
 
 
 def baked_layers(scene: bpy.types.Scene, report: dict[str, Any]) -> list[str]:
@@ -119,12 +146,20 @@ class VIEW3D_OT_radiosity_restore(bpy.types.Operator):
 
 
 def register() -> None:
+    bpy.app.handlers.undo_pre.append(_remember_before_undo)
+    bpy.app.handlers.redo_pre.append(_remember_before_undo)
+    bpy.app.handlers.undo_post.append(_follow_undo)
+    bpy.app.handlers.redo_post.append(_follow_undo)
     bpy.types.Screen.radiosity_baker_looks = StringProperty(options={"HIDDEN"})
     bpy.utils.register_class(VIEW3D_OT_radiosity_show)
     bpy.utils.register_class(VIEW3D_OT_radiosity_restore)
 
 
 def unregister() -> None:
+    bpy.app.handlers.redo_post.remove(_follow_undo)
+    bpy.app.handlers.undo_post.remove(_follow_undo)
+    bpy.app.handlers.redo_pre.remove(_remember_before_undo)
+    bpy.app.handlers.undo_pre.remove(_remember_before_undo)
     bpy.utils.unregister_class(VIEW3D_OT_radiosity_restore)
     bpy.utils.unregister_class(VIEW3D_OT_radiosity_show)
     del bpy.types.Screen.radiosity_baker_looks

@@ -6,7 +6,7 @@ import bpy
 import pytest
 
 import radiosity_baker
-from radiosity_baker.addon import bake_scene, job, operators, panels
+from radiosity_baker.addon import bake_scene, job, panels
 from radiosity_baker.addon.job import BakeJob
 from radiosity_baker.core.progress import Cancelled
 from radiosity_baker.core.scene import Scene, SceneError
@@ -185,7 +185,8 @@ def test_nothing_is_left_behind():
         assert not hasattr(bpy.types.Screen, "radiosity_baker_looks")
         assert not hasattr(bpy.types, "OBJECT_OT_radiosity_bake")
         assert not [name for name in dir(bpy.types) if "PT_radiosity" in name]
-        assert operators._stop_bake not in bpy.app.handlers.load_pre
+        handlers = [*bpy.app.handlers.load_pre, *bpy.app.handlers.undo_post, *bpy.app.handlers.redo_pre]
+        assert not [handler for handler in handlers if handler.__module__.startswith("radiosity_baker")]
         radiosity_baker.register()
 
 

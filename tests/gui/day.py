@@ -20,9 +20,11 @@ PICTURES = DESK / "pictures"
 MODULE = "bl_ext.user_default.radiosity_baker"
 THREAD = "radiosity bake"
 IMPORT, IDENTIFY = shutil.which("import"), shutil.which("identify")  # of ImageMagick
+MIDDLE = "[600x600+360+150]"  # of the picture, which the 3D View fills
 LETTERS = {" ": "SPACE"}
 
 times = {}
+brightness = {}
 
 
 def view_area():
@@ -83,10 +85,10 @@ def picture(name):
     yield from settled()
     path = PICTURES / f"{name}.png"
     subprocess.run([IMPORT, "-window", "root", str(path)], check=True)
-    spread = subprocess.run(
-        [IDENTIFY, "-format", "%[fx:standard_deviation]", str(path)], check=True, capture_output=True, text=True
-    )
-    assert float(spread.stdout) > 0.02, f"the picture {name} is blank"
+    ask = [IDENTIFY, "-format", "%[fx:mean] %[fx:standard_deviation]", f"{path}{MIDDLE}"]
+    answer = subprocess.run(ask, check=True, capture_output=True, text=True).stdout
+    brightness[name], spread = map(float, answer.split())
+    assert spread > 0.02, f"the picture {name} is blank"
     print("picture:", name, flush=True)
 
 
@@ -226,16 +228,19 @@ def bake_undo_redo():
     yield 1.0
     yield from picture("undone")
     assert content() == before, f"one undo step did not take the bake back: {content()}"
+    assert view_area().spaces.active.shading.color_type == "MATERIAL", "undo left the viewport white"
     yield from press("Z", ctrl=True, shift=True)
     yield 1.0
     yield from picture("redone")
     assert content() == after, "redo did not bring the bake back"
+    assert view_area().spaces.active.shading.color_type == "VERTEX"
 
 
 def switch_layers():
     settings().layer = "indirect"
     yield 0.5
     yield from picture("layer")
+    assert brightness["layer"] < brightness["redone"] - 0.01, "the viewport does not show the indirect light"
     settings().layer = "combined"
     bpy.ops.view3d.radiosity_restore()
     yield 0.5
