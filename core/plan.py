@@ -92,7 +92,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         transport_rays=64,
         shadow_rays=4,
         gather_rays=32,
-        passes=4,
+        passes=2,
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),
         threshold=1e-5,
