@@ -8,6 +8,7 @@ import pytest
 from radiosity_baker.core.patches import (
     coarser_groups,
     shading_normals,
+    split_objects,
     triangle_geometry,
     unit_space,
 )
@@ -18,11 +19,13 @@ SURFACES = (Surface("a", (0.1, 0.2, 0.3)), Surface("b", (0.4, 0.5, 0.6), (1, 2, 
 
 @pytest.fixture(scope="module")
 def scene(build) -> Scene:
-    """A striped wall, a dense ball and a block, away from the origin."""
+    """A striped wall, a dense ball, a pearl smaller than a patch and a block, away from the origin."""
     wall = build.quad("wall", (10, 0, 0), (8, 0, 0), (0, 0, 4), surface=[0, 1])
     ball = build.sphere("ball", level=4, surface=np.arange(2048) % 2)
     ball = SceneObject("ball", ball.vertices + np.array([14, 3, 2]), ball.triangles, ball.surface)
-    return Scene((wall, ball, build.box("block", (10, 1, 0), (12, 3, 1), surface=2)), SURFACES)
+    pearl = build.sphere("pearl", radius=0.05, level=2)
+    pearl = SceneObject("pearl", pearl.vertices + np.array([16, 3, 2]), pearl.triangles, pearl.surface)
+    return Scene((wall, ball, pearl, build.box("block", (10, 1, 0), (12, 3, 1), surface=2)), SURFACES)
 
 
 @pytest.fixture(scope="module")
@@ -66,13 +69,13 @@ def test_each_patch_has_one_surface_with_its_emission(patches):
         assert emission == list(surface.emission)
 
 
-def test_no_patch_mixes_objects_or_reaches_far(patches):
-    """Triangles of one patch lie in one cell of the grid they were grouped by, give or take half a triangle."""
+def test_no_patch_mixes_directions_or_reaches_far(scene, patches):
+    """The centres of a patch's triangles lie in one cell of the grid that small ones are grouped by."""
     centers = patches.corners.mean(axis=1)
-    usual = np.sqrt(2 * np.median(patches.patch_area))
+    cell = 0.8 * split_objects(scene, 600).edge / patches.space.metres
     for number in range(len(patches)):
         own = centers[patches.patch == number]
-        assert np.ptp(own, axis=0).max() <= 4 * usual
+        assert np.ptp(own, axis=0).max() <= cell
         facing = patches.normals[patches.patch == number]
         assert (facing @ facing.mean(axis=0)).min() > 0
 
