@@ -208,14 +208,16 @@ def _new_copy(context: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types
 
 
 def _show_instead(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object, copy: bpy.types.Object) -> None:
-    was_active = view_layer.objects.active == obj
+    """The copy takes the original's place in the view, and its part in what is selected and active."""
+    was_active, was_selected = view_layer.objects.active == obj, obj.select_get(view_layer=view_layer)
     obj.select_set(False, view_layer=view_layer)
     obj.hide_set(True, view_layer=view_layer)
     obj.hide_render = True
     copy.hide_render = False
     view_layer.update()
     copy.hide_set(False, view_layer=view_layer)
-    copy.select_set(True, view_layer=view_layer)
+    if was_selected:
+        copy.select_set(True, view_layer=view_layer)
     if was_active:
         view_layer.objects.active = copy
 

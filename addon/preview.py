@@ -6,25 +6,17 @@ not baked (above all the originals under their baked copies) is not in the way.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import bpy
-import numpy as np
 from mathutils import Matrix, Vector
 
 from ..core.scene import SceneError
 
 #: Pixels across. The height follows the scene's own aspect.
 WIDTH = 1280
-
-#: Auto exposure puts this percentile of the luminances, weighted by area, at this linear value. High enough to fill the
-#: picture, low enough that lamps and windows, which are few and far brighter, are what clips.
-WHITE_PERCENTILE, WHITE_VALUE = 95.0, 0.8
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec. 709, Blender's scene-linear primaries
 
 #: What Blender writes into a picture besides the picture: the file's path, the date, how long it took.
 METADATA = ("camera", "date", "filename", "frame", "lens", "marker", "memory", "render_time", "scene", "time")
@@ -36,54 +28,23 @@ THREE_QUARTER_VIEW = Vector((1.0, -1.6, 0.9))
 MARGIN = 1.05
 
 
-def render_preview(
-    scene: bpy.types.Scene,
-    objects: Sequence[bpy.types.Object],
-    path: Path,
-    *,
-    attribute: str,
-    exposure: float | None = None,
-) -> float:
+def render_preview(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], path: Path, *, attribute: str) -> None:
     """Render `objects`, coloured by their attribute `attribute`, through the scene's camera into a PNG at `path`.
 
-    exposure: stops; None keeps the scene's own where it has one, and else chooses one by the baked values. Returns the
-    exposure used. Without a camera the objects are framed from outside. Raises SceneError when an object lacks the
-    attribute.
+    With the exposure of the scene's colour management, as in a render; at 0 the picture has the viewport's own colours.
+    Without a camera the objects are framed from outside. Raises SceneError when an object lacks the attribute.
     """
     for item in objects:
         if attribute not in item.data.color_attributes:
             raise SceneError(f"Object '{item.name}' has no colour attribute '{attribute}': bake it first.")
     bpy.context.view_layer.update()  # objects that were added just now have no place in the world before it
-    if exposure is None:
-        exposure = scene.view_settings.exposure or auto_exposure(objects, attribute)
     with ExitStack() as stack:
         for mesh in {item.data for item in objects}:
             stack.enter_context(_active_colour(mesh, attribute))
         studio = stack.enter_context(_studio(scene, objects))
-        studio.view_settings.exposure = exposure
+        studio.view_settings.exposure = scene.view_settings.exposure
         studio.render.filepath = str(path)
         bpy.ops.render.render(scene=studio.name, write_still=True)
-    return exposure
-
-
-def auto_exposure(objects: Sequence[bpy.types.Object], attribute: str) -> float:
-    """Stops, to a tenth, at which most of the baked surface is neither dark nor clipped; 0 where all is black."""
-    luminances, areas = [], []
-    for item in objects:
-        mesh = item.data
-        colours = np.empty(len(mesh.loops) * 4, np.float32)
-        mesh.color_attributes[attribute].data.foreach_get("color", colours)
-        corners = np.empty(len(mesh.polygons), np.int32)
-        mesh.polygons.foreach_get("loop_total", corners)
-        area = np.empty(len(mesh.polygons), np.float32)
-        mesh.polygons.foreach_get("area", area)
-        luminances.append(colours.reshape(-1, 4)[:, :3] @ LUMINANCE)
-        areas.append(np.repeat(area / corners, corners) * abs(item.matrix_world.determinant()) ** (2 / 3))
-    luminance, weight = np.concatenate(luminances), np.concatenate(areas)
-    order = np.argsort(luminance)
-    below = np.cumsum(weight[order])
-    white = luminance[order[np.searchsorted(below, below[-1] * WHITE_PERCENTILE / 100)]]
-    return round(math.log2(WHITE_VALUE / white), 1) if white > 0 else 0.0
 
 
 @contextmanager

@@ -240,6 +240,14 @@ def test_new_leaves_the_original_alone_and_shows_the_copy_in_its_place(cube, bak
     assert copy[ORIGINAL_KEY] == cube
 
 
+def test_new_selects_nothing_where_nothing_was_selected(cube, bake):
+    cube.select_set(False)
+
+    bake(cube, mode="new", levels=0)
+
+    assert not [obj for obj in bpy.data.objects if obj.select_get()]
+
+
 def test_baking_the_original_again_renews_its_copy(cube, bake):
     (first,) = bake(cube, mode="new", levels=1)
     cube.hide_render = False
