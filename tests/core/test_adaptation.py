@@ -1,0 +1,53 @@
+"""Cells and patches get finer where light breaks, and nowhere else."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.adaptation import patches_by_light
+from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
+
+SUN = SunLamp("sun", (0, 0, -1), (1.0, 1.0, 1.0))
+
+
+def by_light(build, workers, *objects, lamps=(SUN,), wanted=500):
+    scene = Scene(objects, (build.grey,) * 3, lamps)
+    space = unit_space(scene)
+    lights = [place(lamp, space) for lamp in lamps]
+    return patches_by_light(scene, space, lights, build.effort(patches=wanted), 0, workers)[0]
+
+
+def test_patches_are_finer_along_a_shadow_edge(build, workers):
+    """A hard shadow of a square; away from its edge, by more than a patch, nothing is split."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    sail = build.quad("sail", (-0.7, -0.7, 1), (1.4, 0, 0), (0, 1.4, 0))
+    patches = by_light(build, workers, ground, sail)
+    on_ground = patches.normals[:, 2] * (patches.corners[:, :, 2].max(axis=1) < 0) > 0
+    middle = np.abs(patches.corners.mean(axis=1)[on_ground, :2]).max(axis=1) * patches.space.metres
+    area = patches.area[on_ground] * patches.space.metres**2
+    edge = np.abs(middle - 0.7)
+    assert np.median(area[edge < 0.03]) <= np.median(area[edge > 0.5]) / 4
+    assert area[edge > 0.5].min() == pytest.approx(area.max())
+
+
+def test_patches_stay_as_they_are_where_light_is_even(build, workers):
+    patches = by_light(build, workers, build.quad())
+    assert patches.area == pytest.approx(patches.area[0])
+
+
+def test_finer_patches_cover_the_same(build, workers):
+    room = build.furnished_room()
+    lamp = PointLamp("lamp", (0.5, 0.2, 1.5), (1.0, 1.0, 1.0))
+    patches = by_light(build, workers, *room.objects, lamps=(lamp,))
+    whole = 6 * 4 + 2 * 0.6 * 0.6 + 4 * 0.6 * 0.8
+    assert patches.area.sum() * patches.space.metres**2 == pytest.approx(whole)
+    assert len(patches) <= 2 * 500 * 2
+
+
+@pytest.mark.xfail(strict=True, reason="refine_patches probes no cells where no patch is a single triangle")
+def test_a_mesh_of_which_all_patches_are_groups(build, workers):
+    patches = by_light(build, workers, build.sphere(level=6), wanted=30)
+    assert len(patches) < 300
