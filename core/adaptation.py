@@ -93,6 +93,8 @@ class Adaptation:
         for level in range(PATCH_LEVELS):
             cells = patches.as_cells()
             own = np.flatnonzero(np.bincount(patches.patch)[patches.patch] == 1)
+            if not len(own):
+                break
             light = self._probe(cells, own, 50 + level, 1).direct[0]
             mean, fair = _fair_share(cells.area[own], light, _PATCH_STEP)
             chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit)[0][own]]

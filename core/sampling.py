@@ -58,14 +58,3 @@ def triangle_points(unit: Float64) -> Float64:
     first = np.where(lower, u / 2, u - v / 2)
     second = np.where(lower, v - u / 2, v / 2)
     return np.stack([first, second, 1.0 - first - second], axis=-1)
-
-
-def disc_points(unit: Float64) -> Float64:
-    """(n, 2) points of the unit square to (n, 2) points of the unit disc, uniform, by concentric squares (Shirley)."""
-    x, y = 2.0 * unit[..., 0] - 1.0, 2.0 * unit[..., 1] - 1.0
-    wide = np.abs(x) > np.abs(y)
-    radius = np.where(wide, x, y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        turn = np.where(wide, np.pi / 4 * (y / x), np.pi / 2 - np.pi / 4 * (x / y))
-    turn = np.where(radius == 0.0, 0.0, turn)
-    return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=-1)

@@ -41,12 +41,12 @@ class Visibility:
 
     def unblocked(self, origins: Float32, targets: Float32) -> Bool:
         """Whether the segment from each origin to each target (n, 3) is free. Origins are offset already."""
-        reach = np.full(len(origins), 1.0 - SHORTEN, dtype=np.float32)
-        return cast(Bool, self._scene.run(origins, targets - origins, reach, query="OCCLUDED") == -1)
+        return self.unblocked_along(origins, targets - origins)
 
-    def escapes(self, origins: Float32, directions: Float32) -> Bool:
-        """Whether each ray (n, 3) leaves the scene without meeting anything."""
-        return cast(Bool, self._scene.run(origins, directions, query="OCCLUDED") == -1)
+    def unblocked_along(self, origins: Float32, ways: Float32) -> Bool:
+        """The same for ways (n, 3) from each origin to its target."""
+        reach = np.full(len(origins), 1.0 - SHORTEN, dtype=np.float32)
+        return cast(Bool, self._scene.run(origins, ways, reach, query="OCCLUDED") == -1)
 
 
 def offset_along(points: Float64, normals: Float64) -> Float32:

@@ -44,47 +44,62 @@ class DirectLight:
         partly = np.zeros(len(points), dtype=bool)
         cast = 0
         origins = offset_along(points, normals)
+        along = np.stack([points.T, normals.T, shading.T]).astype(np.float32)
         for light, name in zip(self.lights, self._names, strict=True):
-            share = light.unoccluded(points, shading)
+            share = light.share(points, shading)
             lit = np.flatnonzero(share * light.color.max() > _NEGLIGIBLE * irradiance.max(axis=1, initial=0.0))
             if not len(lit):
                 continue
-            # Two independent halves of the targets: how much they differ is how far their mean can be trusted.
-            halves = 2 if light.sized else 1
-            per_half = max(1, rays // 2) if light.sized else 1
-            unit = _lattices(len(lit), halves, per_half, rng)
-            targets, weights, gain = light.aim(points[lit], shading[lit], unit.reshape(len(lit), -1, 2))
-            free = self._free(points[lit], normals[lit], origins[lit], targets, weights * gain)
+            # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
+            halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
+            unit = _lattices(halves, per_half, len(lit), rng)
+            free, weights, gains = self._look(light, along[:, :, lit], origins[lit], unit)
             cast += free.size
-            shape = (-1, halves, per_half)
-            visible = _weighted_mean((free * gain).reshape(shape), weights.reshape(shape))
-            arriving = (share[lit, None] * visible)[:, :, None] * light.color
-            irradiance[lit] += arriving.mean(axis=1)
+            arrived = weights * free if gains is None else weights * gains * free
+            visible = _ratio(arrived.sum(axis=0), weights.sum(axis=0))
+            irradiance[lit] += (share[lit] * visible)[:, None] * light.color
             if halves == 2:
-                variance[lit] += (arriving[:, 0] - arriving[:, 1]) ** 2 / 4.0
-            all_of_it = free.all(axis=1)
-            signature[lit] += np.where(all_of_it, name, 0)
-            partly[lit] |= free.any(axis=1) & ~all_of_it
+                shape = (halves, per_half, len(lit))
+                first, second = _ratio(arrived.reshape(shape).sum(axis=1), weights.reshape(shape).sum(axis=1))
+                variance[lit] += ((share[lit] * (first - second))[:, None] * light.color) ** 2 / 4.0
+            whole = free.all(axis=0)
+            signature[lit] += np.where(whole, name, 0)
+            partly[lit] |= free.any(axis=0) & ~whole
         signature[partly] = -1
         return Illumination(irradiance, variance, signature, cast)
 
-    def _free(self, points: Float64, normals: Float64, origins: Float32, targets: Float64, weights: Float64) -> Bool:
-        """Which targets (n, r, 3) can be seen; those that shed nothing count as seen."""
+    def _look(
+        self, light: Light, along: Float32, origins: Float32, unit: Float32
+    ) -> tuple[Bool, Float32, Float32 | None]:
+        """Which of the ways (r, n) to a light are free, what each counts, and the light's gain along it.
+
+        along (3, 3, n): points, normals and shading normals, components first. Ways that bring nothing count as free,
+        for no ray is cast along them.
+        """
+        points, normals, shading = along
+        towards, depth = light.aim(points, unit)
+        squared = (towards * towards).sum(axis=0)
+        inverse = 1 / np.sqrt(np.maximum(squared, np.float32(1e-30)))
+        cosine = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * inverse
+        weights = cosine * depth * inverse**3
+        gains = light.gain(towards, inverse)
+        free = weights == 0 if gains is None else weights * gains == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
-        above = np.einsum("nrk,nk->nr", targets - points[:, None], normals) > 0
-        free = weights == 0
-        index = np.nonzero(above & ~free)
-        free[index] = self._visibility.unblocked(origins[index[0]], targets[index].astype(np.float32))
-        return free
+        above = (towards * normals[:, None]).sum(axis=0) > 0
+        sample, point = np.nonzero(above & ~free)
+        directions = np.ascontiguousarray(towards[:, sample, point].T)
+        free[sample, point] = self._visibility.unblocked_along(origins[point], directions)
+        return free, weights, gains
 
 
-def _lattices(points: int, halves: int, count: int, rng: np.random.Generator) -> Float64:
-    """(points, halves, count, 2): even sets of the unit square, each shifted by itself."""
-    lattice = np.column_stack([(np.arange(count) + 0.5) / count, np.arange(count) * GOLDEN])
-    return np.asarray((lattice + rng.random((points, halves, 1, 2))) % 1.0)
+def _ratio(arrived: Float32, total: Float32) -> Float32:
+    """Share of the light that arrives. No way counts where only a sliver of the light shows, or from inside a lamp:
+    then nothing is in the way."""
+    return np.divide(arrived, total, out=np.ones_like(total), where=total > 0)
 
 
-def _weighted_mean(values: Float64, weights: Float64) -> Float64:
-    """(n, halves): the mean of values (n, halves, r) by their weights."""
-    total = weights.sum(axis=2)
-    return np.divide((weights * values).sum(axis=2), total, out=np.zeros_like(total), where=total > 0)
+def _lattices(halves: int, count: int, points: int, rng: np.random.Generator) -> Float32:
+    """(2, halves * count, points): even sets of the unit square, each shifted by itself."""
+    lattice = np.stack([(np.arange(count) + 0.5) / count, np.arange(count) * GOLDEN]).astype(np.float32)
+    unit = lattice[:, None, :, None] + rng.random((2, halves, 1, points), dtype=np.float32)
+    return (unit - np.floor(unit)).reshape(2, halves * count, points)

@@ -1,33 +1,33 @@
 """Lamps as a receiver sees them: how much arrives when nothing is in the way, and where to aim shadow rays.
 
-Every lamp answers two questions, for points in the unit box:
-- `unoccluded(points, normals)`: the share of its light that arrives, (n,), so that irradiance = share * colour;
-- `aim(points, normals, unit)`: targets (n, r, 3) spread over the lamp, the weight (n, r) of the light from each if the
-  lamp shone alike in all directions, and the gain (n, r), how much of that it really sends this way.
-Irradiance is colour * share * (sum of weight * gain of the free targets / sum of all weights): exact wherever no target
-is blocked and the lamp shines evenly.
+Every lamp answers three questions, for points in the unit box:
+- `share(points, normals)`: how much of its light arrives, (n,), as if it shone evenly: irradiance = share * colour;
+- `aim(points, unit)`: ways from the points to places spread over the lamp, and the lamp's depth along them;
+- `gain(towards, inverse)`: how much of an even lamp's light it really sends along these ways, or None for all of it.
+A way of direction w counts cos(receiver, w) * cos(lamp, w) / length^2, the cosine at the lamp being depth / length.
+Irradiance is colour * share * (sum of count * gain of the free ways / sum of all counts): exact wherever no way is
+blocked and the lamp shines evenly. The arrays of ways have components and samples first, (3, r, n), in single
+precision: numpy then runs along the points.
 """
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..form_factors.polygon import polygon_irradiance
 from ..patches import Space
-from ..sampling import disc_points
-from ..scene import AreaLamp, Float64, Lamp, PointLamp, SpotLamp, SunLamp
+from ..scene import AreaLamp, Float32, Float64, Lamp, PointLamp, SpotLamp, SunLamp
 from .cap import cap_irradiance
+
+Real = TypeVar("Real", np.float32, np.float64)
 
 #: An ellipse is the polygon of this many corners and of the same area; its irradiance is off by less than 1e-3.
 _ELLIPSE_CORNERS = 32
 #: How far away the targets of a sun are, in half extents of the scene: beyond every occluder.
-_BEYOND = 8.0
-
-
-#: Targets (n, r, 3), weights (n, r), gains (n, r).
-Aim = tuple[Float64, Float64, Float64]
+_BEYOND = np.float32(8)
 
 
 class Light(Protocol):
@@ -37,9 +37,11 @@ class Light(Protocol):
     color: Float64
     sized: bool
 
-    def unoccluded(self, points: Float64, normals: Float64) -> Float64: ...
+    def share(self, points: Float64, normals: Float64) -> Float64: ...
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim: ...
+    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]: ...
+
+    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None: ...
 
 
 def place(lamp: Lamp, space: Space) -> Light:
@@ -55,18 +57,19 @@ def place(lamp: Lamp, space: Space) -> Light:
             return Ball(lamp, space)
 
 
-def cosines(directions: Float64, normals: Float64) -> Float64:
-    """Cosine (n, r), not below zero, between directions (n, r, 3) of any length and normals (n, 3)."""
-    length = np.sqrt(np.einsum("nrk,nrk->nr", directions, directions))
-    return np.maximum(np.einsum("nrk,nk->nr", directions, normals), 0.0) / np.maximum(length, 1e-30)
+def frame(axis: Float32) -> tuple[Float32, Float32]:
+    """Two unit vectors (3, n) that complete each unit axis (3, n) to a frame (Duff et al. 2017)."""
+    x, y, z = axis
+    sign = np.where(z >= 0, np.float32(1), np.float32(-1))
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.stack([1 + sign * x * x * a, sign * b, -sign * x]), np.stack([b, sign + y * y * a, -y])
 
 
-def perpendicular(axis: Float64) -> tuple[Float64, Float64]:
-    """Two unit vectors (n, 3) that complete each unit axis (n, 3) to a frame."""
-    helper = np.where(np.abs(axis[:, :1]) > 0.7, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
-    first = np.cross(axis, helper)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return first, np.cross(axis, first)
+def disc(unit: Float32) -> tuple[Float32, Float32]:
+    """Points (2, r, n) of the unit square to the coordinates of points of the unit disc, (r, n) each, uniform."""
+    radius, angle = np.sqrt(unit[0]), np.float32(2 * np.pi) * unit[1]
+    return radius * np.cos(angle), radius * np.sin(angle)
 
 
 class Ball:
@@ -83,42 +86,39 @@ class Ball:
         self.color = np.array(lamp.intensity) / space.metres**2
         self.sized = self.radius > 0
 
-    def unoccluded(self, points: Float64, normals: Float64) -> Float64:
-        axis, distance, radius, height = self._silhouette(points)
-        cosine = np.einsum("nk,nk->n", axis, normals)
+    def share(self, points: Float64, normals: Float64) -> Float64:
+        towards = self.position - points
+        distance = np.sqrt(np.einsum("nk,nk->n", towards, towards))
+        cosine = np.einsum("nk,nk->n", towards, normals) / np.maximum(distance, 1e-30)
         if not self.sized:
             return np.maximum(cosine, 0.0) / np.maximum(distance, 1e-9) ** 2
+        radius, height = self._silhouette(distance)
         sine = np.where(height > 0, radius / np.sqrt(radius**2 + height**2), 2.0)
         return cap_irradiance(cosine, sine) / self.radius**2
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
-        axis, _, radius, height = self._silhouette(points)
+    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
+        towards = self.position.astype(np.float32)[:, None] - points
+        distance = np.sqrt((towards * towards).sum(axis=0))
         if not self.sized:
-            targets = np.broadcast_to(self.position, (len(points), unit.shape[1], 3))
-            return targets, np.ones(unit.shape[:2]), self._gain(targets - points[:, None])
-        first, second = perpendicular(axis)
-        disc = disc_points(unit) * radius[:, None, None]
-        targets = (points + axis * height[:, None])[:, None]
-        targets = targets + disc[..., :1] * first[:, None] + disc[..., 1:] * second[:, None]
-        towards = targets - points[:, None]
-        squared = np.einsum("nrk,nrk->nr", towards, towards)
-        weights = cosines(towards, normals) * height[:, None] / np.maximum(squared, 1e-30) ** 1.5
-        return targets, weights, self._gain(targets - points[:, None])
+            return towards[:, None], distance[None]
+        axis = towards / np.maximum(distance, np.float32(1e-30))
+        radius, height = self._silhouette(distance)
+        first, second = frame(axis)
+        x, y = disc(unit)
+        spread = (x * radius) * first[:, None] + (y * radius) * second[:, None]
+        return (axis * height)[:, None] + spread, height[None]
 
-    def _gain(self, towards: Float64) -> Float64:
-        """What the lamp sends against the directions (n, r, 3) from the points, relative to one that shines evenly."""
-        return np.ones(towards.shape[:2])
+    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+        return None
 
-    def _silhouette(self, points: Float64) -> tuple[Float64, Float64, Float64, Float64]:
-        """Unit axis (n, 3) and distance (n,) to the lamp; radius (n,) and height (n,) of the disc it looks like."""
-        axis = self.position - points
-        distance = np.linalg.norm(axis, axis=1)
-        axis = axis / np.maximum(distance, 1e-30)[:, None]
-        if self.facing_disc or not self.sized:
-            return axis, distance, np.full(len(points), self.radius), distance
+    def _silhouette(self, distance: NDArray[Real]) -> tuple[NDArray[Real], NDArray[Real]]:
+        """Radius (n,) and height (n,) over the receiver of the disc that the lamp looks like from a distance (n,)."""
+        if self.facing_disc:
+            return np.full_like(distance, self.radius), distance
         inside = distance <= self.radius
         shrink = np.sqrt(np.maximum(1.0 - (self.radius / np.maximum(distance, self.radius)) ** 2, 0.0))
-        return axis, distance, np.where(inside, self.radius, self.radius * shrink), distance * shrink**2
+        shrink = shrink.astype(distance.dtype)
+        return np.where(inside, distance.dtype.type(self.radius), self.radius * shrink), distance * shrink**2
 
 
 class Spot(Ball):
@@ -126,16 +126,31 @@ class Spot(Ball):
 
     def __init__(self, lamp: SpotLamp, space: Space) -> None:
         super().__init__(lamp, space)
-        self.axes = np.array(lamp.axes)
+        self.inverse_axes = np.linalg.inv(np.array(lamp.axes))
         self.cosine = np.cos(lamp.cone_angle / 2)
         self.softness = max((1.0 - self.cosine) * lamp.blend, 1e-6)
+        # How much wider the cone may look from a lamp of this size, whose axes may be stretched.
+        stretch = np.linalg.cond(self.inverse_axes)
+        self.widening = self.radius * stretch
 
-    def _gain(self, towards: Float64) -> Float64:
+    def share(self, points: Float64, normals: Float64) -> Float64:
+        """That of an even lamp, but nothing where no part of the lamp shines."""
+        towards = self.position - points
+        local = towards @ self.inverse_axes
+        length = np.maximum(np.sqrt(np.einsum("nk,nk->n", local, local)), 1e-30)
+        distance = np.maximum(np.sqrt(np.einsum("nk,nk->n", towards, towards)), 1e-30)
+        off_axis = np.arccos(np.clip(local[:, 2] / length, -1.0, 1.0))
+        reached = off_axis < np.arccos(self.cosine) + np.arctan(self.widening / distance)
+        share = np.zeros(len(points))
+        share[reached] = super().share(points[reached], normals[reached])
+        return share
+
+    def gain(self, towards: Float32, inverse: Float32) -> Float32:  # noqa: ARG002 - lengths are the local ones
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
-        local = towards @ np.linalg.inv(self.axes)
-        depth = local[..., 2] / np.maximum(np.linalg.norm(local, axis=-1), 1e-30)
-        step = np.clip((depth - self.cosine) / self.softness, 0.0, 1.0)
-        return step * step * (3.0 - 2.0 * step)
+        local = np.tensordot(self.inverse_axes.T.astype(np.float32), towards, axes=1)
+        depth = local[2] / np.sqrt(np.maximum((local * local).sum(axis=0), np.float32(1e-30)))
+        step = np.clip((depth - np.float32(self.cosine)) / np.float32(self.softness), 0, 1)
+        return step * step * (3 - 2 * step)
 
 
 class Sun:
@@ -146,19 +161,27 @@ class Sun:
         self.color = np.array(lamp.irradiance)
         self.axis = -np.array(lamp.direction) / np.linalg.norm(lamp.direction)
         self.tangent = np.tan(min(lamp.angle, 0.999 * np.pi) / 2)
-        self.sized = self.tangent > 1e-6
-        self.frame = np.concatenate(perpendicular(self.axis[None]))
+        self.sized = bool(self.tangent > 1e-6)
 
-    def unoccluded(self, points: Float64, normals: Float64) -> Float64:
+    def share(self, points: Float64, normals: Float64) -> Float64:
         cosine = normals @ self.axis
         if not self.sized:
             return np.maximum(cosine, 0.0)
         sine = self.tangent / np.sqrt(1.0 + self.tangent**2)
         return cap_irradiance(cosine, np.full(len(points), sine)) / sine**2
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
-        directions = self.axis + self.tangent * (disc_points(unit) @ self.frame)
-        return points[:, None] + _BEYOND * directions, cosines(directions, normals), np.ones(unit.shape[:2])
+    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
+        axis = self.axis.astype(np.float32)[:, None]
+        depth = np.full((1, points.shape[1]), _BEYOND, dtype=np.float32)
+        if not self.sized:
+            return np.broadcast_to(_BEYOND * axis[:, None], (3, 1, points.shape[1])), depth
+        first, second = frame(axis)
+        x, y = disc(unit)
+        reach = np.float32(_BEYOND * self.tangent)
+        return _BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None]), depth
+
+    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+        return None
 
 
 class Panel:
@@ -190,41 +213,36 @@ class Panel:
         corners = space.normalise(np.array(lamp.center)) + outline @ np.stack([half_u, half_v])
         return cls(lamp.name, corners, np.array(lamp.radiance), two_sided=False, spread=lamp.spread)
 
-    def unoccluded(self, points: Float64, normals: Float64) -> Float64:
+    def share(self, points: Float64, normals: Float64) -> Float64:
         return polygon_irradiance(points, normals, self.corners, two_sided=self.two_sided)
 
-    def aim(self, points: Float64, normals: Float64, unit: Float64) -> Aim:
-        targets = self._spread(unit)
-        towards = targets - points[:, None]
-        squared = np.einsum("nrk,nrk->nr", towards, towards)
-        behind = -np.einsum("nrk,k->nr", towards, self.normal)
-        facing = np.abs(behind) if self.two_sided else np.maximum(behind, 0.0)
-        weights = cosines(towards, normals) * facing / np.maximum(squared, 1e-30) ** 1.5
-        return targets, weights, self._gain(facing / np.sqrt(np.maximum(squared, 1e-30)))
+    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
+        origin, first, second = (v.astype(np.float32)[:, None, None] for v in self._axes())
+        x, y = self._coordinates(unit)
+        towards = origin + x * first + y * second - points[:, None]
+        depth = -np.tensordot(self.normal.astype(np.float32), towards, axes=1)
+        return towards, np.abs(depth) if self.two_sided else np.maximum(depth, 0)
 
-    def _gain(self, cosine: Float64) -> Float64:
+    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:
         """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
-        (tan h - tan a) / (tan h - h), as Cycles does it; cosine is that of a."""
+        (tan h - tan a) / (tan h - h), as Cycles does it, a being the angle off the axis and h half the spread."""
         if self.half_spread >= np.pi / 2 - 1e-6:
-            return np.ones_like(cosine)
+            return None
+        cosine = np.abs(np.tensordot(self.normal.astype(np.float32), towards, axes=1)) * inverse
         edge = np.tan(self.half_spread)
-        tangent = np.sqrt(np.maximum(1.0 - cosine**2, 0.0)) / np.maximum(cosine, 1e-9)
-        return np.maximum(edge - tangent, 0.0) / (edge - self.half_spread)
+        tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / np.maximum(cosine, 1e-9)
+        return np.maximum(edge - tangent, 0) / (edge - self.half_spread)
 
-    def _spread(self, unit: Float64) -> Float64:
-        """Points (n, r, 3) of the polygon, uniform, from points (n, r, 2) of the unit square."""
+    def _axes(self) -> tuple[Float64, Float64, Float64]:
+        """Origin and two axes of the coordinates that spread the unit square over the polygon."""
         corners = self.corners
-        if len(corners) == 3:
-            from_square = np.sqrt(unit[..., :1])
-            along = unit[..., 1:]
-            return (
-                corners[0]
-                + from_square * (1 - along) * (corners[1] - corners[0])
-                + from_square * along * (corners[2] - corners[0])
-            )
-        if len(corners) == 4:
-            return corners[0] + unit[..., :1] * (corners[1] - corners[0]) + unit[..., 1:] * (corners[3] - corners[0])
+        if len(corners) <= 4:
+            return corners[0], corners[1] - corners[0], corners[-1] - corners[0]
         center = corners.mean(axis=0)
-        quarter = len(corners) // 4
-        axes = np.stack([corners[0] - center, corners[quarter] - center])
-        return center + disc_points(unit) @ axes
+        return center, corners[0] - center, corners[len(corners) // 4] - center
+
+    def _coordinates(self, unit: Float32) -> tuple[Float32, Float32]:
+        if len(self.corners) == 3:
+            root = np.sqrt(unit[0])
+            return root * (1 - unit[1]), root * unit[1]
+        return (unit[0], unit[1]) if len(self.corners) == 4 else disc(unit)

@@ -47,7 +47,6 @@ def test_finer_patches_cover_the_same(build, workers):
     assert len(patches) <= 2 * 500 * 2
 
 
-@pytest.mark.xfail(strict=True, reason="refine_patches probes no cells where no patch is a single triangle")
 def test_a_mesh_of_which_all_patches_are_groups(build, workers):
     patches = by_light(build, workers, build.sphere(level=6), wanted=30)
     assert len(patches) < 300

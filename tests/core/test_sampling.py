@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from radiosity_baker.core.sampling import cosine_patterns, disc_points, frames, plane_points, stream, triangle_points
+from radiosity_baker.core.sampling import cosine_patterns, frames, plane_points, stream, triangle_points
 
 #: Single precision: a handful of roundings of numbers up to one.
 SINGLE = 8 * 2.0**-24
@@ -116,22 +116,6 @@ def test_neighbours_in_the_square_stay_neighbours_in_the_triangle():
     there = np.clip(here + rng.uniform(-1e-4, 1e-4, here.shape), 0, 1)
     moved = np.abs(triangle_points(here) - triangle_points(there)).max(axis=1)
     assert (moved <= 1.01 * np.abs(here - there).sum(axis=1)).all()
-
-
-def test_disc_points_are_uniform():
-    """Of a uniform disc E r^2 = 1/2, E r^4 = 1/3 and E x^2 = 1/4; the circle cuts no cell: squares map to rings."""
-    side = 256
-    x, y = disc_points(grid(side)).T
-    squared = x * x + y * y
-    assert squared.max() <= 1
-    for moment, truth in ((squared, 1 / 2), (squared**2, 1 / 3), (x * x, 1 / 4), (x, 0), (y, 0), (x * y, 0)):
-        assert moment.mean() == pytest.approx(truth, abs=4 / side**2)
-    inside = np.count_nonzero(squared < 0.25) / side**2
-    assert inside == pytest.approx(0.25, abs=2 / side)
-
-
-def test_the_disc_has_a_middle():
-    assert disc_points(np.array([[0.5, 0.5]])).tolist() == [[0, 0]]
 
 
 def test_plane_points_are_even_and_go_on_where_they_stopped():

@@ -31,11 +31,6 @@ def test_the_first_triangle_on_the_way_is_met(layers):
     assert layers.nearest(single([0.7, 0.2, 2]), up).tolist() == [-1]
 
 
-def test_escape_is_a_ray_that_meets_nothing(layers):
-    origins, directions = single([0.7, 0.2, 2], [0.7, 0.2, 0.25]), single([0, 0, 1], [0, 0, 1])
-    assert layers.escapes(origins, directions).tolist() == [True, False]
-
-
 def test_a_segment_is_blocked_by_what_is_between_its_ends_only(layers):
     origins = single([0.7, 0.2, 0.1], [0.7, 0.2, 0.1], [0.7, 0.2, 0.6], [2, 0.2, 0.1])
     targets = single([0.7, 0.2, 0.4], [0.7, 0.2, 0.6], [0.7, 0.2, 0.9], [2, 0.2, 5])
@@ -63,7 +58,7 @@ def test_rays_do_not_run_into_the_surface_they_leave():
         height = directions @ normal
         directions += (np.abs(height) - height)[:, None] * normal
         origins = offset_along(weights @ triangle, np.tile(normal, (200, 1)))
-        assert Visibility(triangle[None]).escapes(origins, directions.astype(np.float32)).all()
+        assert (Visibility(triangle[None]).nearest(origins, directions.astype(np.float32)) == -1).all()
 
 
 def test_the_offset_is_along_the_normal():
@@ -80,7 +75,6 @@ def test_a_closed_surface_leaks_nothing(build, level):
     rng = np.random.default_rng(4)
     origins = rng.uniform(-0.3, 0.3, (250_000, 3)).astype(np.float32)
     directions = rng.normal(size=origins.shape).astype(np.float32)
-    assert not visibility.escapes(origins, directions).any()
     assert visibility.nearest(origins, directions).min() >= 0
 
 
