@@ -1,0 +1,164 @@
+"""What a bake will simulate, why, and what it will cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.plan import LOOKING, MOST_PANELS, plan
+from radiosity_baker.core.receivers import make_receivers
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
+from radiosity_baker.core.settings import Settings
+
+AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+COLOR = (1.0, 1.0, 1.0)
+LAMPS = {
+    "point lamps": PointLamp("Bulb", (0, 0, 1), COLOR),
+    "spot lamps": SpotLamp("Torch", (0, 0, 1), COLOR, AXES, 1.0, 0.1),
+    "sun": SunLamp("Noon", (0, 0, -1), COLOR),
+    "area lamps": AreaLamp("Softbox", (0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, -1), COLOR),
+}
+
+
+def effects(scene, **asked):
+    return {effect.name: effect for effect in plan(scene, Settings(**asked)).effects}
+
+
+@pytest.fixture
+def ground(build):
+    return Scene((build.quad(),), (build.grey,))
+
+
+@pytest.mark.parametrize("kind", LAMPS)
+def test_each_kind_of_lamp_is_on_only_where_there_is_one(ground, kind):
+    found = effects(replace(ground, lamps=(LAMPS[kind],)))
+    assert {name for name in LAMPS if found[name].active} == {kind}
+    assert LAMPS[kind].name in found[kind].reason
+
+
+def test_many_lamps_are_counted_not_listed(ground):
+    lamps = tuple(PointLamp(f"Lamp {k}", (0, 0, 1), COLOR) for k in range(7))
+    assert effects(replace(ground, lamps=lamps))["point lamps"].reason == "Lamp 0, Lamp 1, Lamp 2 and 4 more"
+
+
+@pytest.mark.parametrize(
+    ("lamp", "soft"),
+    [
+        (LAMPS["point lamps"], False),
+        (replace(LAMPS["point lamps"], radius=0.1), True),
+        (replace(LAMPS["spot lamps"], radius=0.1), True),
+        (LAMPS["sun"], False),
+        (replace(LAMPS["sun"], angle=0.01), True),
+        (LAMPS["area lamps"], True),
+    ],
+)
+def test_shadows_are_soft_where_a_lamp_has_a_size(ground, lamp, soft):
+    effect = effects(replace(ground, lamps=(lamp,)))["soft shadows"]
+    assert effect.active == soft
+    assert (lamp.name in effect.reason) == soft
+
+
+def test_sky_emitters_and_bounces(ground):
+    dark = effects(ground)
+    assert not dark["sky"].active
+    assert not dark["emitting surfaces"].active
+    assert dark["bounces"].active
+    assert "50%" in dark["bounces"].reason
+    assert effects(replace(ground, sky=(0, 0, 0.1)))["sky"].active
+    glowing = replace(ground, surfaces=(Surface("glow", (0, 0, 0), (0, 1, 0)),))
+    found = effects(glowing)
+    assert found["emitting surfaces"].active
+    assert not found["bounces"].active
+
+
+def test_unused_materials_count_for_nothing(ground):
+    """Neither their light nor their albedo."""
+    scene = Scene(ground.objects, (Surface("black", (0, 0, 0)), Surface("glow", (1, 1, 1), (5, 5, 5))))
+    found = effects(scene)
+    assert not found["emitting surfaces"].active
+    assert not found["bounces"].active
+
+
+def test_the_number_of_bounces_that_matter(ground):
+    """0.5 ** 9 is the first power of one half under 0.2 %."""
+    assert "about 9 bounces" in effects(ground)["bounces"].reason
+
+
+def test_many_emitting_triangles_are_left_to_the_rays(build):
+    few, many = build.box(surface=1), build.sphere(level=2, surface=1)
+    surfaces = (build.grey, Surface("glow", emission=(1, 1, 1)))
+    assert not plan(Scene((few,), surfaces), Settings()).effort.emitters_by_rays
+    assert len(many.triangles) > MOST_PANELS
+    assert plan(Scene((many,), surfaces), Settings()).effort.emitters_by_rays
+
+
+def test_every_effect_has_a_reason(build):
+    for effect in plan(build.furnished_room(), Settings()).effects:
+        assert effect.reason
+        assert effect.name
+
+
+def test_nothing_looks_around_where_nothing_is_to_be_seen(ground):
+    black = replace(ground, surfaces=(Surface("black", (0, 0, 0)),), lamps=(LAMPS["sun"],))
+    planned = plan(black, Settings())
+    assert not planned.looks_around
+    assert not any(e.active for e in planned.effects if e.name in LOOKING)
+    assert plan(replace(black, sky=COLOR), Settings()).looks_around
+    assert plan(replace(black, surfaces=(Surface("grey", (0.1, 0, 0)),)), Settings()).looks_around
+
+
+def test_effects_that_are_off_cast_no_ray(ground):
+    black = replace(ground, surfaces=(Surface("black", (0, 0, 0)),), lamps=(LAMPS["point lamps"],))
+    rays = bake(black, Settings(triangles=50, error=0.08, threads=1)).report.rays
+    assert rays.get("gather", 0) == rays.get("transport", 0) == 0
+    assert rays["shadow"] > 0
+    no_lamps = replace(ground, sky=COLOR)
+    rays = bake(no_lamps, Settings(triangles=50, error=0.08, threads=1)).report.rays
+    assert rays.get("shadow", 0) == 0
+    assert rays["gather"] > 0
+
+
+@pytest.mark.parametrize("asked", [{"triangles": 500}, {"triangles": 20_000}, {"size": 0.1}, {"size": 0.03}])
+def test_the_predicted_cells_are_the_actual_ones_within_a_factor_of_two(build, asked):
+    ball = build.sphere("ball", radius=0.3, level=2)
+    scene = Scene((*build.furnished_room().objects, ball), (build.grey,) * 3)
+    settings = Settings(**asked)
+    actual = len(make_receivers(scene, unit_space(scene), settings).cells)
+    assert actual / 2 <= plan(scene, settings).cells <= actual * 2
+
+
+def test_cost_is_positive_and_grows_with_what_is_asked(build):
+    room = build.furnished_room()
+    small, large = plan(room, Settings(triangles=500)), plan(room, Settings(triangles=200_000))
+    assert small.seconds > 0
+    assert 0 < small.memory_mb < large.memory_mb
+    # Three hundred times the cells: whatever else runs on this machine meanwhile, it takes longer.
+    assert small.seconds < large.seconds
+    finer = plan(room, Settings(error=0.005))
+    assert finer.effort.patches > plan(room, Settings(error=0.05)).effort.patches
+
+
+def test_asked_seconds_are_what_the_plan_says(build):
+    assert plan(build.furnished_room(), Settings(error=None, seconds=3.5)).seconds == 3.5
+    assert plan(build.furnished_room(), Settings(error=0.02, seconds=1e-6)).seconds == 1e-6
+
+
+def test_the_asked_estimator_is_used(build):
+    room = build.furnished_room()
+    assert plan(room, Settings()).effort.estimator == "hemisphere"
+    for name in ("hemisphere", "analytic", "centroid"):
+        assert plan(room, Settings(estimator=name)).effort.estimator == name
+
+
+def test_planning_changes_nothing(build):
+    room = build.furnished_room()
+    before = [o.vertices.tobytes() for o in room.objects]
+    first, second = plan(room, Settings()), plan(room, Settings())
+    assert first.effects == second.effects
+    assert first.effort == second.effort
+    assert [o.vertices.tobytes() for o in room.objects] == before
+    assert np.isfinite(first.seconds)

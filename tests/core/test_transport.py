@@ -1,0 +1,197 @@
+"""Light between patches: closed furnaces, the ledger of energy, backs, and the insides of solids."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core import survey
+from radiosity_baker.core.direct.emitters import emitting_panels
+from radiosity_baker.core.direct.illumination import DirectLight
+from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.hemisphere import Codes
+from radiosity_baker.core.parallel import Workers
+from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.plan import plan
+from radiosity_baker.core.progress import Progress
+from radiosity_baker.core.scene import PointLamp, Scene, SunLamp, Surface
+from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.transport import make_transport, solve_halves
+from radiosity_baker.core.visibility import Visibility
+
+
+def lit(transport, scene, **changes):
+    """The scene solved with its lamps and panels."""
+    space = unit_space(scene)
+    lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
+    return transport(scene, lights, **changes)
+
+
+@pytest.mark.parametrize("by_rays", [True, False])
+@pytest.mark.parametrize("albedo", [0.5, 0.9, 0.99])
+@pytest.mark.parametrize(("estimator", "patches"), [("hemisphere", 500), ("analytic", 100)])
+def test_a_furnace_has_the_radiosity_of_its_series(build, transport, estimator, patches, albedo, by_rays):
+    """E + p E + p^2 E ... = E / (1 - p) everywhere in a closed cube, to 1e-3, in under 50 iterations."""
+    surface = Surface("glowing", (albedo, albedo, albedo), (1.0, 2.0, 4.0))
+    scene = Scene((build.box(inward=True),), (surface,))
+    space = unit_space(scene)
+    lights = () if by_rays else emitting_panels(scene, space)
+    solved = transport(scene, lights, estimator=estimator, patches=patches, emitters_by_rays=by_rays)
+    emitted = np.pi * np.array(surface.emission)
+    radiosity = emitted + solved.reflected
+    assert radiosity == pytest.approx(np.tile(emitted / (1 - albedo), (len(radiosity), 1)), rel=1e-3)
+    assert solved.solution.iterations < 50
+
+
+@pytest.mark.parametrize("estimator", ["hemisphere", "analytic"])
+def test_a_closed_room_absorbs_all_that_is_emitted(transport, build, estimator):
+    """The ledger closes to what the solve left, which is at most its tolerance of the largest irradiance anywhere."""
+    tolerance = 1e-4
+    solved = lit(transport, build.furnished_room(), estimator=estimator, patches=300, tolerance=tolerance)
+    ledger = solved.energy()
+    assert ledger["escaped"] == 0
+    assert ledger["emitted"] == pytest.approx(ledger["absorbed"] + ledger["residual"])
+    area = solved.sides.area.sum() * solved.sides.patches.space.metres**2
+    assert abs(ledger["residual"]) <= 2 * (tolerance + 1e-6) * area * solved.solution.irradiance.max()
+
+
+@pytest.mark.parametrize("estimator", ["hemisphere", "analytic"])
+def test_open_ground_sends_what_it_reflects_to_the_sky(build, transport, estimator):
+    """Sun of irradiance E on an area A: emitted E A, absorbed (1 - p) E A, escaped p E A."""
+    ground = build.quad("ground", (0, 0, 0), (3, 0, 0), (0, 2, 0))
+    scene = Scene((ground,), (Surface("s", (0.25, 0.25, 0.25)),), (SunLamp("sun", (0, 0, -1), (5.0, 5.0, 5.0)),))
+    ledger = lit(transport, scene, estimator=estimator, patches=100).energy()
+    expected = {"emitted": 30.0, "absorbed": 22.5, "escaped": 7.5, "residual": 0.0}
+    assert ledger == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_sky_arrives_where_it_is_seen(build, transport):
+    scene = Scene((build.quad(),), (build.grey,), sky=(1.0, 2.0, 3.0))
+    solved = transport(scene, patches=50)
+    assert solved.escape == pytest.approx(1.0)
+    assert solved.incoming == pytest.approx(np.tile(np.pi * np.array(scene.sky), (len(solved.incoming), 1)))
+
+
+def test_light_in_a_sphere_spreads_evenly_after_one_bounce(build, transport):
+    """F_ij = A_j / A, so whatever the lamp lights first, what comes back is p P / (A (1 - p)) everywhere.
+
+    A row of N = 1024 rays finds the mean of the light with the standard deviation s / sqrt(N), where s is that of the
+    first light over the surface; its balance with its neighbours only helps. Flat patches make the sphere's row of one
+    in 2000 uneven, and its radius smaller by one in 500.
+    """
+    albedo, radius = 0.5, 2.0
+    scene = Scene(
+        (build.sphere(radius=radius, level=4, inward=True),),
+        (Surface("s", (albedo,) * 3),),
+        (PointLamp("lamp", (1.0, 0, 0), (10.0, 10.0, 10.0)),),
+    )
+    solved = lit(transport, scene, patches=2000, transport_rays=1024)
+    power, area = 4 * np.pi * 10, 4 * np.pi * radius**2
+    assert solved.energy()["emitted"] == pytest.approx(power, rel=0.01)
+    back = (solved.solution.irradiance - solved.incoming)[:, 0]
+    even = albedo * power / (area * (1 - albedo))
+    weight = solved.sides.area / solved.sides.area.sum()
+    assert weight @ back == pytest.approx(even, rel=0.01)
+    spread = np.sqrt(weight @ (solved.incoming[:, 0] - weight @ solved.incoming[:, 0]) ** 2)
+    noise = albedo * spread / np.sqrt(1024)
+    assert np.sqrt(weight @ (back - weight @ back) ** 2) <= noise + 0.004 * even
+
+
+def test_a_plane_reflects_and_receives_from_both_sides(build, transport):
+    """A lamp between ground and ceiling: which way the ceiling's normals face makes no difference."""
+    ground = build.quad("ground", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    lamp = PointLamp("lamp", (0, 0, 0.5), (1.0, 1.0, 1.0))
+    ledgers = []
+    for u, v in (((2, 0, 0), (0, 2, 0)), ((0, 2, 0), (2, 0, 0))):
+        ceiling = build.quad("ceiling", (-1, -1, 1), u, v)
+        ledgers.append(lit(transport, Scene((ground, ceiling), (build.grey,), (lamp,)), transport_rays=512).energy())
+    shows_back, shows_front = ledgers
+    assert shows_back["emitted"] == pytest.approx(shows_front["emitted"], rel=0.01)
+    # Counting hits with 512 rays of each of hundreds of patches: shares of the whole are good to 1 %.
+    for name in ("absorbed", "escaped"):
+        assert shows_back[name] == pytest.approx(shows_front[name], rel=0.01)
+    # Each bounce between the two parallel squares keeps p F = 0.5 * 0.415253 of the light, as the catalogue has it.
+    assert shows_front["escaped"] > 0.25 * shows_front["emitted"]
+
+
+def test_the_inside_of_a_solid_on_the_ground_stays_dark(build, transport):
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    block = build.box("block", (-0.63, -0.41, 0), (0.5, 0.47, 1.2), surface=1)
+    surfaces = (build.grey, Surface("block", (0.8, 0.8, 0.8)))
+    scene = Scene((ground, block), surfaces, (SunLamp("sun", (0.3, 0.2, -0.9), (3.0, 3.0, 3.0)),), (1.0, 1.0, 1.0))
+    solved = lit(transport, scene, patches=1500)
+    inside = solved.sides.back & np.isclose(solved.sides.albedo[:, 0], 0.8)
+    outside = ~solved.sides.back & np.isclose(solved.sides.albedo[:, 0], 0.8)
+    assert inside.any()
+    assert solved.solution.irradiance[outside].mean() > 1
+    leaked, usual = solved.solution.irradiance[inside], solved.solution.irradiance[outside].mean()
+    assert leaked.max() <= survey._DARK / 5 * usual, "so that no point in there is taken for lit"
+    assert leaked.mean() <= 1e-3 * usual
+
+
+def test_the_open_part_of_the_ground_is_what_takes_part(build, transport):
+    """Of the 16 m^2 all but the block's footprint, and that of patches that lie under it whole."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    block = build.box("block", (-0.63, -0.41, 0), (0.5, 0.47, 1.2), surface=1)
+    surfaces = (build.grey, Surface("block", (0.8, 0.8, 0.8)))
+    solved = transport(Scene((ground, block), surfaces, sky=(1.0, 1.0, 1.0)), patches=3000)
+    seen = np.isclose(solved.sides.albedo[:, 0], 0.5) & (solved.escape > 0)
+    metres = solved.sides.patches.space.metres
+    straddling = solved.sides.hidden.any(axis=1) & seen
+    # Each straddling patch's open share is one of four points': off by at most a half, evenly.
+    slack = 4 * np.sqrt(np.sum((0.5 * solved.sides.patches.patch_area[solved.sides.patch[straddling]]) ** 2))
+    assert straddling.any()
+    assert solved.sides.area[seen].sum() * metres**2 == pytest.approx(16 - 1.13 * 0.88, abs=slack * metres**2)
+
+
+def test_tables_hold_the_light_of_the_side_that_a_ray_meets(build, transport):
+    scene = Scene((build.furnished_room().objects[0],), (build.grey,) * 3, (PointLamp("l", (0, 0, 1), (1, 1, 1)),))
+    solved = lit(transport, scene, patches=100)
+    patches = solved.sides.patches
+    codes = Codes(len(patches.area))
+    table = solved.by_code(solved.reflected)
+    assert table.shape == (2 * len(patches.area) + 2, 3)
+    place_of = {int(side): row for row, side in enumerate(solved.sides.side)}
+    for triangle in (0, 17, len(patches.area) - 1):
+        front = place_of[int(patches.patch[triangle])]
+        assert table[triangle] == pytest.approx(solved.reflected[front], rel=1e-6)
+        assert (table[triangle + codes.triangles] == 0).all(), "backs that nothing reaches are dark"
+    assert (table[[codes.escaped, codes.lost]] == 0).all()
+
+
+def test_coarser_patches_keep_constants_and_means(build, transport):
+    solved = lit(transport, build.furnished_room(), patches=800)
+    values = solved.reflected
+    coarse = solved.over_coarser_patches(values)
+    assert solved.sides.area @ coarse == pytest.approx(solved.sides.area @ values)
+    assert solved.over_coarser_patches(np.ones_like(values)) == pytest.approx(1.0)
+    assert len(np.unique(coarse[:, 0])) < len(np.unique(values[:, 0])) / 2
+
+
+def test_halves_are_independent_answers_to_one_question(build, workers):
+    scene = build.furnished_room()
+    space = unit_space(scene)
+    patches = build.patches(scene, 500)
+    visibility = Visibility(patches.corners)
+    light = DirectLight([place(lamp, space) for lamp in scene.lamps], visibility, 0)
+    planned = plan(scene, Settings(error=0.08))
+    one, two = solve_halves(patches, visibility, light, np.zeros(3), planned, workers, 0)
+    assert one.solution.irradiance.tobytes() != two.solution.irradiance.tobytes()
+    assert one.energy()["absorbed"] == pytest.approx(two.energy()["absorbed"], rel=0.03)
+    black = Scene(scene.objects, (Surface("black", (0, 0, 0)),) * 3, scene.lamps)
+    assert solve_halves(patches, visibility, light, np.zeros(3), plan(black, Settings()), workers, 0) == ()
+
+
+@pytest.mark.parametrize("estimator", ["hemisphere", "analytic", "centroid"])
+def test_threads_do_not_change_a_byte(build, estimator):
+    scene = build.furnished_room()
+    patches = build.patches(scene, 200)
+    visibility = Visibility(patches.corners)
+    light = DirectLight([place(lamp, unit_space(scene)) for lamp in scene.lamps], visibility, 0)
+    found = []
+    for threads in (1, 2):
+        with Workers(threads, Progress()) as workers:
+            effort = build.effort(estimator=estimator)
+            solved = make_transport(patches, visibility, light, np.zeros(3), effort, workers, seed=0, purpose="threads")
+        found.append(solved.solution.irradiance.tobytes())
+    assert found[0] == found[1]
