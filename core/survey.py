@@ -160,10 +160,8 @@ class Survey:
         return valid
 
     def refine_boundaries(self, passes: int) -> None:
-        """More points, for direct light only, in the cells that shadow boundaries cross."""
-        corner_vertex = self.receivers.corner_vertex[self.receivers.cells.element]
-        boundary = shadow_boundary(corner_vertex, self.receivers.vertices, self._signatures)
-        chosen = np.flatnonzero(boundary & ~self.invalid)
+        """More points, for direct light only, in the cells where shadow boundaries leave it uncertain."""
+        chosen = np.flatnonzero(self._uncertain() & ~self.invalid)
         if not len(chosen):
             return
         everywhere = np.ones(len(chosen), dtype=bool)
@@ -174,6 +172,23 @@ class Survey:
             light = self._direct(points, 1_000_000 + self._extra)
             self._add_direct(self._extra, chosen, points, light, everywhere)
             self._extra += 1
+
+    def _uncertain(self) -> Bool:
+        """Cells (c,) that a shadow boundary crosses, and whose direct light varies by more than their fair share of the
+        error that is asked for."""
+        cells, vertices = self.receivers.cells, self.receivers.vertices
+        corner = self.receivers.corner_vertex[cells.element]
+        boundary = shadow_boundary(corner, vertices, self._signatures)
+        samples = self.direct[0].channel(-1) + self.direct[1].channel(-1)
+        count = np.maximum(samples.count, 1.0)
+        mean = samples.light.sum(axis=1)[:, 0] / count
+        variance = np.maximum(samples.squares[:, 0] / count - mean**2, 0.0) / count
+        # Two equal samples prove little, so a cell is as uncertain as those around it.
+        around = np.bincount(corner.ravel(), np.repeat(variance, 3), vertices) / np.bincount(
+            corner.ravel(), minlength=vertices
+        ).clip(1)
+        fair = (self._effort.error * float(cells.area @ mean)) ** 2 / float(cells.area.sum()) / len(cells)
+        return boundary & (around[corner].max(axis=1) * cells.area > fair)
 
     def _direct(self, points: Points, number: int) -> Illumination:
         light = gather_direct(points, self._light, self._effort.shadow_rays, self._seed, number, self._workers)
