@@ -276,12 +276,6 @@ def test_a_channel_without_light_is_exactly_black(room):
     assert values(result)[:, 2].max() > 0
 
 
-def test_meshes_denser_than_patches_bake(build):
-    """Where every patch is a group of triangles; a convex ball in the open sees all of the sky above each tangent."""
-    result = preview(Scene((build.sphere(level=6),), (WHITE,), sky=SKY), triangles=1000)
-    assert values(result).min() > 0
-
-
 @pytest.mark.parametrize("tessellate", [True, False])
 @pytest.mark.parametrize(
     ("vertices", "faces"),

@@ -22,9 +22,9 @@ def scene(build) -> Scene:
     """A striped wall, a dense ball, a pearl smaller than a patch and a block, away from the origin."""
     wall = build.quad("wall", (10, 0, 0), (8, 0, 0), (0, 0, 4), surface=[0, 1])
     ball = build.sphere("ball", level=4, surface=np.arange(2048) % 2)
-    ball = SceneObject("ball", ball.vertices + np.array([14, 3, 2]), ball.triangles, ball.surface)
+    ball = SceneObject("ball", 2 * ball.vertices + np.array([14, 3, 2]), ball.triangles, ball.surface)
     pearl = build.sphere("pearl", radius=0.05, level=2)
-    pearl = SceneObject("pearl", pearl.vertices + np.array([16, 3, 2]), pearl.triangles, pearl.surface)
+    pearl = SceneObject("pearl", pearl.vertices + np.array([17.1, 0.9, 3.7]), pearl.triangles, pearl.surface)
     return Scene((wall, ball, pearl, build.box("block", (10, 1, 0), (12, 3, 1), surface=2)), SURFACES)
 
 

@@ -145,17 +145,25 @@ def test_the_open_part_of_the_ground_is_what_takes_part(build, transport):
 
 
 def test_tables_hold_the_light_of_the_side_that_a_ray_meets(build, transport):
-    scene = Scene((build.furnished_room().objects[0],), (build.grey,) * 3, (PointLamp("l", (0, 0, 1), (1, 1, 1)),))
+    """Over ground and a ceiling that shows its back to it and to the lamp between them."""
+    ground = build.quad("ground", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    ceiling = build.quad("ceiling", (-1, -1, 1), (2, 0, 0), (0, 2, 0), surface=1)
+    lamp = PointLamp("lamp", (0, 0, 0.5), (1.0, 1.0, 1.0))
+    scene = Scene((ground, ceiling), (build.grey, Surface("other", (0.3, 0.3, 0.3))), (lamp,))
     solved = lit(transport, scene, patches=100)
     patches = solved.sides.patches
     codes = Codes(len(patches.area))
     table = solved.by_code(solved.reflected)
     assert table.shape == (2 * len(patches.area) + 2, 3)
-    place_of = {int(side): row for row, side in enumerate(solved.sides.side)}
-    for triangle in (0, 17, len(patches.area) - 1):
-        front = place_of[int(patches.patch[triangle])]
-        assert table[triangle] == pytest.approx(solved.reflected[front], rel=1e-6)
-        assert (table[triangle + codes.triangles] == 0).all(), "backs that nothing reaches are dark"
+    row_of = {int(side): row for row, side in enumerate(solved.sides.side)}
+    for triangle, patch in enumerate(patches.patch.tolist()):
+        for code, side in ((triangle, patch), (triangle + codes.triangles, patch + len(patches))):
+            expected = solved.reflected[row_of[side]] if side in row_of else np.zeros(3)
+            assert table[code] == pytest.approx(expected, rel=1e-6)
+    above = np.isclose(patches.albedo[patches.patch, 0], 0.3)
+    fronts, backs = table[: codes.triangles], table[codes.triangles : codes.escaped]
+    assert backs[above].min() > fronts[above].max()
+    assert backs[~above].max() == 0, "nothing reaches under the ground"
     assert (table[[codes.escaped, codes.lost]] == 0).all()
 
 
