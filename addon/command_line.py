@@ -1,4 +1,4 @@
-"""What the command line can do: bake a file, or say what baking it would take."""
+"""What the command line can do: bake a file, say what baking it would take, or measure what accuracy costs there."""
 
 from __future__ import annotations
 
@@ -12,22 +12,28 @@ import sys
 import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, redirect_stdout
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
 import bpy
 
+from ..core.ladder import QUICK, Scale
 from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import Report
 from ..core.scene import SceneError
 from ..core.settings import LAYERS, Settings
-from . import wording
+from . import accuracy_plot, accuracy_report, wording
+from .accuracy import Asked, measure
 from .bake_scene import bake_objects
 from .preview import render_preview
 from .scene_reader import pick_receivers, read_scene
 
 SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
+
+#: Triangles of the middle of the accuracy ladder.
+_TRIANGLES = 20_000
 
 MANIFEST = Path(__file__).resolve().parent.parent / "blender_manifest.toml"
 
@@ -114,6 +120,51 @@ def _plan(options: argparse.Namespace, progress: Progress) -> None:
     for warning in scene.warnings:
         print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
     print(f"About {outlook.seconds:.1f} s and {outlook.memory_mb:,.0f} MB.")
+
+
+def _accuracy(options: argparse.Namespace, progress: Progress) -> None:
+    """Bake a file at many efforts and by Cycles, and write how wrong each was: ladder.csv, ladder.md and ladder.png.
+
+    The file itself stays as it is. True light is computed once by Cycles and kept in the output folder.
+    """
+    path = options.input or _open(None)
+    folder = options.output or path.with_name(f"{path.stem}-accuracy")
+    _check_destinations([folder / "ladder.csv"] if folder.exists() else [folder])
+
+    def open_receivers() -> list[bpy.types.Object]:
+        _open(path)
+        return pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
+
+    def say(line: str) -> None:
+        if not options.quiet:
+            print(line, flush=True)
+
+    open_receivers()  # so that a file that cannot be used leaves no folder behind
+    folder.mkdir(exist_ok=True)
+    scale, few = (QUICK, True) if options.quick else (Scale(_TRIANGLES), False)
+    asked = Asked(
+        path,
+        folder,
+        replace(scale, triangles=options.triangles or scale.triangles),
+        Settings(seed=options.seed, threads=options.threads),
+        points=options.points or (1_000 if few else 4_000),
+        samples=options.samples or (64 if few else 512),
+    )
+    reference, steps = measure(asked, open_receivers, progress, say)
+    clock = "processor_seconds" if options.processor_time else "seconds"
+    table = accuracy_report.markdown(asked, reference, steps, clock)
+    with ExitStack() as unfinished:
+        names = ("ladder.csv", "ladder.md")
+        figures, report = (unfinished.enter_context(_moved_into_place(folder / name)) for name in names)
+        accuracy_report.write_csv(figures, steps)
+        report.write_text(table, encoding="utf-8")
+        progress.check()
+    try:
+        with _moved_into_place(folder / "ladder.png") as picture:
+            accuracy_plot.draw(picture, f"What accuracy costs in {path.name}", steps, clock)
+    except accuracy_plot.NoPlotting as problem:
+        say(str(problem))
+    say(f"\n{table}\nWritten to {folder}.")
 
 
 def _say_what_was_done(report: Report, *, quiet: bool) -> None:
@@ -234,20 +285,45 @@ def _parser() -> argparse.ArgumentParser:
     outlook = commands.add_parser("plan", help="what a bake would simulate and cost", description=_plan.__doc__)
     _add_scene_arguments(outlook)
     outlook.set_defaults(command=_plan)
+    ladder = commands.add_parser(
+        "accuracy", help="measure what accuracy costs in seconds, against Cycles", description=_accuracy.__doc__
+    )
+    _add_accuracy_arguments(ladder)
+    ladder.set_defaults(command=_accuracy)
     return parser
 
 
-def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
-    """What to bake and how well: the same for doing it and for planning it."""
+def _add_input_arguments(parser: argparse.ArgumentParser) -> None:
+    """What every command needs: what to bake, and how the machine is used for it."""
     parser.add_argument(
         "input", type=_file(".blend"), nargs="?", metavar="IN.blend", help="the scene; else what is open"
     )
     parser.add_argument("--objects", type=_names, metavar="A,B", help="meshes to bake; else the selected, else all")
+    parser.add_argument("--seed", type=_whole, default=Settings.seed, help="another seed, another noise (0)")
+    parser.add_argument("--threads", type=_whole, default=Settings.threads, help="0, the default, takes every core")
+    parser.add_argument("--quiet", action="store_true", help="print problems only")
+
+
+def _add_accuracy_arguments(parser: argparse.ArgumentParser) -> None:
+    _add_input_arguments(parser)
+    parser.add_argument("--output", type=_file(""), metavar="DIR", help="the folder to write to; else IN-accuracy")
+    parser.add_argument("--quick", action="store_true", help="few and small steps, a coarse reference")
+    parser.add_argument(
+        "--triangles", type=_whole, help=f"of the middle step ({_TRIANGLES:,}; quick {QUICK.triangles:,})"
+    )
+    parser.add_argument("--points", type=_whole, help="where bakes are compared with the truth (4,000; quick 1,000)")
+    parser.add_argument("--samples", type=_whole, help="paths for each of a point's three estimates (512; quick 64)")
+    parser.add_argument(
+        "--processor-time", action="store_true", help="plot processor seconds: for a machine that others use as well"
+    )
+
+
+def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
+    """What to bake and how well: the same for doing it and for planning it."""
+    _add_input_arguments(parser)
     goal = parser.add_mutually_exclusive_group()
     goal.add_argument("--error", type=_positive, default=Settings.error, help="surface error to reach (0.02 is 2 %%)")
     goal.add_argument("--seconds", type=_positive, help="time to use instead")
-    parser.add_argument("--seed", type=_whole, default=Settings.seed, help="another seed, another noise (0)")
-    parser.add_argument("--threads", type=_whole, default=Settings.threads, help="0, the default, takes every core")
     parser.add_argument(
         "--result",
         choices=("keep", "replace", "new"),
@@ -256,7 +332,6 @@ def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
     )
     layers = f"besides combined, any of {', '.join(layer for layer in LAYERS if layer != 'combined')}"
     parser.add_argument("--layers", type=_layers, default=Settings.layers, metavar="A,B", help=layers)
-    parser.add_argument("--quiet", action="store_true", help="print problems only")
 
 
 def _file(suffix: str) -> Callable[[str], Path]:

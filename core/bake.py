@@ -13,7 +13,7 @@ from .direct.lamps import place
 from .layers import baked_objects
 from .parallel import Workers
 from .patches import unit_space
-from .plan import plan
+from .plan import Effort, plan
 from .progress import Progress
 from .receivers import make_receivers
 from .refinement import refine
@@ -25,20 +25,23 @@ from .survey import Survey, look_up
 from .transport import solve_halves
 
 
-def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> BakeResult:
+def bake(
+    scene: Scene, settings: Settings, progress: Progress | None = None, effort: Effort | None = None
+) -> BakeResult:
     """Bake the light of a scene onto its receivers.
 
+    effort: to work just so hard, instead of as hard as the settings call for.
     Raises SceneError for a scene that cannot be baked, Cancelled when progress says so.
     """
     clock = Clock(progress or Progress())
     with clock.stage("plan", 0.0):
         scene = check_scene(scene)
-        planned = plan(scene, settings)
+        planned = plan(scene, settings, effort)
     effort, sky = planned.effort, np.array(scene.sky)
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
             space = unit_space(scene)
-            receivers = make_receivers(scene, space, settings)
+            receivers = make_receivers(scene, space, settings, effort.triangles)
             lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
             patches, visibility = patches_by_light(scene, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
@@ -46,7 +49,7 @@ def bake(scene: Scene, settings: Settings, progress: Progress | None = None) -> 
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
-            limit = 2 * max(len(receivers.cells), settings.triangles)
+            limit = 2 * max(len(receivers.cells), effort.triangles)
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
             receivers = adaptation.refine_receivers(receivers, limit, effort.error)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)

@@ -8,8 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
-from .parallel import thread_count
+from .parallel import Workers, thread_count
 from .patches import Space, make_patches, split_objects, triangle_geometry, unit_space
+from .progress import Progress
 from .result import Effect
 from .sampling import stream
 from .scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp
@@ -21,23 +22,29 @@ from .visibility import Visibility
 MOST_PANELS = 64
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky", "emitting surfaces")
+#: Triangles and patches below which a bake shows next to nothing.
+_FEWEST = 1500
 #: Rays that measure how fast this machine traces this scene.
 _CALIBRATION_RAYS = 1 << 16
-#: Seconds that a ray, a cell and a patch side cost besides tracing, relative to tracing one ray: measured once on the
-#: sample scenes, as ratios, which other machines share better than seconds.
-_RAY_OVERHEAD, _CELL_OVERHEAD, _SIDE_OVERHEAD = 1.5, 60.0, 300.0
+#: What a ray that looks around, a shadow ray, a cell and a patch side cost, in rays that only meet something: measured
+#: on the sample scenes, as ratios, which machines share better than seconds.
+_RAY_COST, _SHADOW_COST, _CELL_COST, _SIDE_COST = 1.7, 1.5, 120.0, 300.0
 _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard a bake works. error: relative, to aim at;
-    patches: wanted number; transport_rays: of a patch side; shadow_rays: to a lamp with size;
-    gather_rays: of a sample point; passes over all cells before the error is first estimated, boundary_passes over the
-    cells that shadow boundaries cross; tolerance: of the solve; threshold: form factor under which pairs are culled;
-    emitters_by_rays: emitting triangles are too many to be lamps."""
+    """How hard a bake works.
+
+    error: relative, to aim at; triangles: that would cover the receivers, where no size is asked for; patches: wanted
+    number; transport_rays: of a patch side; shadow_rays: to a lamp with size; gather_rays: of a sample point; passes
+    over all cells before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the
+    light uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays:
+    emitting triangles are too many to be lamps.
+    """
 
     error: float
+    triangles: int
     estimator: str
     patches: int
     transport_rays: int
@@ -66,15 +73,30 @@ class Plan:
         return any(e.active for e in self.effects if e.name in LOOKING)
 
 
-def plan(scene: Scene, settings: Settings) -> Plan:
-    """Decide and predict. Traces a few thousand rays to know this machine; changes nothing."""
-    effort = choose_effort(scene, settings)
+def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan:
+    """Decide and predict. Traces a few thousand rays to know this machine; changes nothing.
+
+    effort: to work just so hard, instead of as hard as the settings call for.
+    """
     effects = choose_effects(scene, settings)
+    if effort is not None:
+        return _priced(scene, settings, effects, effort)
+    effort = choose_effort(scene, settings)
+    planned = _priced(scene, settings, effects, effort)
+    if settings.seconds is None or planned.seconds <= settings.seconds:
+        return planned
+    # Too little time for all: fewer triangles and patches, down to where they would show nothing any more.
+    share = max(settings.seconds / planned.seconds, 0.02)
+    patches = max(int(effort.patches * share), min(effort.patches, _FEWEST))
+    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), patches=patches)
+    return replace(_priced(scene, settings, effects, fewer), seconds=settings.seconds)
+
+
+def _priced(scene: Scene, settings: Settings, effects: tuple[Effect, ...], effort: Effort) -> Plan:
     receivers = scene.receivers()
     vertices, triangles = [o.vertices for o in receivers], [o.triangles for o in receivers]
-    edge = settings.size or edge_for_count(vertices, triangles, settings.triangles)
-    cells = predicted_count(vertices, triangles, edge)
-    unpriced = Plan(effects, effort, cells, 0.0, 0.0)
+    edge = settings.size or edge_for_count(vertices, triangles, effort.triangles)
+    unpriced = Plan(effects, effort, predicted_count(vertices, triangles, edge), 0.0, 0.0)
     seconds, memory = predict(scene, settings, unpriced)
     return replace(unpriced, seconds=seconds, memory_mb=memory)
 
@@ -87,6 +109,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
     return Effort(
         error=asked,
+        triangles=settings.triangles,
         estimator=estimator,
         patches=patches,
         transport_rays=64,
@@ -142,30 +165,33 @@ def emitting_triangles(scene: Scene) -> int:
 
 def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[float, float]:
     """Seconds and peak MB of the bake, from how long a few rays take here and now."""
-    effort, cells, looks_around = unpriced.effort, unpriced.cells, unpriced.looks_around
-    ray = _seconds_per_ray(scene, unit_space(scene))
-    sides = 1.2 * effort.patches if looks_around else 0
+    effort, cells = unpriced.effort, unpriced.cells
+    sides = 1.2 * effort.patches if unpriced.looks_around else 0
     lights = len(scene.lamps) + min(emitting_triangles(scene), MOST_PANELS)
-    rays = 2 * sides * effort.transport_rays + (cells * effort.passes * effort.gather_rays if looks_around else 0)
-    rays += lights * effort.shadow_rays * (cells * (effort.passes + 0.3 * effort.boundary_passes) + 8 * sides)
-    work = rays * _RAY_OVERHEAD + cells * _CELL_OVERHEAD + sides * _SIDE_OVERHEAD
-    seconds = work * ray / thread_count(settings.threads)
-    if settings.seconds is not None:
-        seconds = min(seconds, settings.seconds) if settings.error is not None else settings.seconds
+    around = 2 * sides * effort.transport_rays
+    if unpriced.looks_around:
+        around += cells * effort.passes * effort.gather_rays
+    shadow = lights * effort.shadow_rays * (cells * (effort.passes + 3) + 16 * sides)
+    work = around * _RAY_COST + shadow * _SHADOW_COST + cells * _CELL_COST + sides * _SIDE_COST
+    seconds = work * _seconds_per_ray(scene, unit_space(scene), thread_count(settings.threads))
     memory = (_BYTES_AT_REST + cells * _BYTES_PER_CELL + sides * _BYTES_PER_SIDE) / 1e6
     return seconds, memory
 
 
-def _seconds_per_ray(scene: Scene, space: Space) -> float:
+def _seconds_per_ray(scene: Scene, space: Space, threads: int) -> float:
+    """Seconds that all threads together need for a ray that looks around."""
     patches = make_patches(scene, space, split_objects(scene, 2048))
     visibility = Visibility(patches.corners)
     rng = stream(0, "calibration")
     chosen = rng.integers(len(patches.area), size=_CALIBRATION_RAYS)
     directions = rng.normal(size=(_CALIBRATION_RAYS, 3)) + 1.5 * patches.normals[chosen]
     origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
-    begun = perf_counter()
-    visibility.nearest(origins.astype(np.float32), directions.astype(np.float32))
-    return (perf_counter() - begun) / _CALIBRATION_RAYS
+    rays = origins.astype(np.float32), directions.astype(np.float32)
+    with Workers(threads, Progress()) as workers:
+        begun = perf_counter()
+        for _ in workers.map(lambda *_: visibility.nearest(*rays), threads, 1):
+            pass
+        return (perf_counter() - begun) / (threads * _CALIBRATION_RAYS)
 
 
 def _mean_albedo(scene: Scene) -> float:
