@@ -28,7 +28,7 @@ _FEWEST = 1500
 _CALIBRATION_RAYS = 1 << 16
 #: What a ray that looks around, a shadow ray, a cell and a patch side cost, in rays that only meet something: measured
 #: on the sample scenes, as ratios, which machines share better than seconds.
-_RAY_COST, _SHADOW_COST, _CELL_COST, _SIDE_COST = 1.7, 1.5, 120.0, 300.0
+_RAY_COST, _SHADOW_COST, _CELL_COST, _SIDE_COST = 1.7, 1.5, 180.0, 300.0
 _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 
 
@@ -36,15 +36,16 @@ _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 class Effort:
     """How hard a bake works.
 
-    error: relative, to aim at; triangles: that would cover the receivers, where no size is asked for; patches: wanted
-    number; transport_rays: of a patch side; shadow_rays: to a lamp with size; gather_rays: of a sample point; passes
-    over all cells before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the
-    light uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays:
-    emitting triangles are too many to be lamps.
+    error: relative, to aim at; triangles: that would cover the receivers, where no size is asked for; growth: how many
+    times as many adaptation may make of them; patches: wanted number; transport_rays: of a patch side; shadow_rays: to
+    a lamp with size; gather_rays: of a sample point; passes over all cells before the error is first estimated,
+    boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the solve;
+    threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be lamps.
     """
 
     error: float
     triangles: int
+    growth: float
     estimator: str
     patches: int
     transport_rays: int
@@ -88,7 +89,7 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     # Too little time for all: fewer triangles and patches, down to where they would show nothing any more.
     share = max(settings.seconds / planned.seconds, 0.02)
     patches = max(int(effort.patches * share), min(effort.patches, _FEWEST))
-    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), patches=patches)
+    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), growth=1.2, patches=patches)
     return replace(_priced(scene, settings, effects, fewer), seconds=settings.seconds)
 
 
@@ -110,6 +111,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     return Effort(
         error=asked,
         triangles=settings.triangles,
+        growth=2.0,
         estimator=estimator,
         patches=patches,
         transport_rays=64,

@@ -37,15 +37,13 @@ class Receivers:
     vertices: int
 
 
-def make_receivers(scene: Scene, space: Space, settings: Settings) -> Receivers:
-    """Tessellate the receivers to edges of the asked size, or to about the asked number of triangles in all.
+def make_receivers(scene: Scene, space: Space, settings: Settings, triangles: int) -> Receivers:
+    """Tessellate the receivers to edges of the asked size, or so that about `triangles` of one size would cover them.
 
     Where the mesh is to be kept, the output has the input's triangles, and only the sampling is as fine as that.
     """
     objects = scene.receivers()
-    edge = settings.size or edge_for_count(
-        [o.vertices for o in objects], [o.triangles for o in objects], settings.triangles
-    )
+    edge = settings.size or edge_for_count([o.vertices for o in objects], [o.triangles for o in objects], triangles)
     fine = [triform(whole(o.vertices, o.triangles), edge) for o in objects]
     return lay_out(objects, fine, space, tessellate=settings.tessellate)
 

@@ -204,8 +204,8 @@ class Fit:
 def gradient_jumps(receivers: Receivers, measured: Bool) -> tuple[Int32, Float64, Float64]:
     """Vertices (e, 4), coefficients (e, 4) and weights (e,) of the gradient's jump over each smooth interior edge.
 
-    For an edge between triangles with apexes k and l the jump, made dimensionless by the mean height over the edge, is
-    (x_k - x at its foot) / h_k + (x_l - x at its foot) / h_l, zero for every linear function.
+    For an edge between triangles with apexes k and l the jump, made dimensionless by the lesser height over the edge,
+    is (x_k - x at its foot) / h_k + (x_l - x at its foot) / h_l, zero for every linear function.
     """
     vertex = receivers.corner_vertex
     here, there = shared_edges(vertex)
@@ -221,10 +221,10 @@ def gradient_jumps(receivers: Receivers, measured: Bool) -> tuple[Int32, Float64
         s = np.einsum("ek,ek->e", to_apex, along) / squared
         foot.append(s)
         height.append(np.linalg.norm(to_apex - s[:, None] * along, axis=1))
-    mean = (height[0] + height[1]) / 2
-    solid = np.minimum(height[0], height[1]) > 1e-3 * np.sqrt(squared)
+    mean, least = (height[0] + height[1]) / 2, np.minimum(height[0], height[1])
+    solid = least > 1e-3 * np.sqrt(squared)
     with np.errstate(divide="ignore", invalid="ignore"):
-        first, second = mean / height[0], mean / height[1]
+        first, second = least / height[0], least / height[1]
     jump = np.stack(
         [-first * (1 - foot[0]) - second * (1 - foot[1]), -first * foot[0] - second * foot[1], first, second], axis=1
     )

@@ -127,7 +127,7 @@ def test_the_predicted_cells_are_the_actual_ones_within_a_factor_of_two(build, a
     ball = build.sphere("ball", radius=0.3, level=2)
     scene = Scene((*build.furnished_room().objects, ball), (build.grey,) * 3)
     settings = Settings(**asked)
-    actual = len(make_receivers(scene, unit_space(scene), settings).cells)
+    actual = len(make_receivers(scene, unit_space(scene), settings, settings.triangles).cells)
     assert actual / 2 <= plan(scene, settings).cells <= actual * 2
 
 

@@ -15,7 +15,8 @@ SURFACES = (Surface("a"), Surface("b"))
 
 def receive(*objects, **settings) -> Receivers:
     scene = Scene(objects, SURFACES)
-    return make_receivers(scene, unit_space(scene), Settings(**settings))
+    asked = Settings(**settings)
+    return make_receivers(scene, unit_space(scene), asked, asked.triangles)
 
 
 def flat_normals(vertices, triangles):

@@ -38,7 +38,8 @@ def floor(build):
 
 def receive(build, *objects, **asked):
     scene = Scene(objects, (build.grey,))
-    return make_receivers(scene, unit_space(scene), Settings(**asked))
+    settings = Settings(**asked)
+    return make_receivers(scene, unit_space(scene), settings, settings.triangles)
 
 
 def sample(receivers, function, passes=6, valid=None, seed=0) -> Samples:
