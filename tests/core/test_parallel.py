@@ -1,0 +1,69 @@
+"""Chunks of work: the same cut and the same order with any number of threads, and a stop between any two."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from radiosity_baker.core.parallel import Workers, thread_count
+from radiosity_baker.core.progress import Cancelled, Progress
+
+
+def chunks(threads: int, count: int, chunk: int) -> list[tuple[int, int, int]]:
+    with Workers(threads, Progress()) as workers:
+        return list(workers.map(lambda number, part: (number, part.start, part.stop), count, chunk))
+
+
+@pytest.mark.parametrize(("count", "chunk"), [(10, 3), (9, 3), (1, 5), (0, 5)])
+def test_chunks_cover_the_items_once_and_in_order(count, chunk):
+    cut = chunks(1, count, chunk)
+    assert [number for number, _, _ in cut] == list(range(len(cut)))
+    assert [item for _, start, stop in cut for item in range(start, stop)] == list(range(count))
+    assert all(stop - start <= chunk for _, start, stop in cut)
+    assert chunks(3, count, chunk) == cut
+
+
+def test_results_come_in_order_whichever_is_done_first():
+    def late_first(number: int, _: slice) -> int:
+        time.sleep(0.05 if number == 0 else 0.0)
+        return number
+
+    with Workers(2, Progress()) as workers:
+        assert list(workers.map(late_first, 6, 1)) == list(range(6))
+
+
+def test_threads_work_at_the_same_time():
+    """Each waits for the other; one after the other they would wait for ever."""
+    both = threading.Barrier(2, timeout=5)
+    with Workers(2, Progress()) as workers:
+        list(workers.map(lambda *_: both.wait(), 2, 1))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_no_chunk_begins_after_a_stop(threads):
+    progress, begun = Progress(), []
+
+    def work(number: int, _: slice) -> None:
+        begun.append(number)
+        if number == 3:
+            progress.cancel()
+
+    with Workers(threads, progress) as workers, pytest.raises(Cancelled):
+        list(workers.map(work, 1000, 1))
+    # Another thread may be inside a chunk of its own while the fourth one stops the rest.
+    assert len(begun) <= 4 + threads
+
+
+def test_an_error_in_a_chunk_comes_out():
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError
+
+    with Workers(2, Progress()) as workers, pytest.raises(ZeroDivisionError):
+        list(workers.map(fail, 4, 1))
+
+
+def test_threads_are_as_asked_or_as_many_as_there_are_cores():
+    assert thread_count(3) == 3
+    assert thread_count(0) >= 1
