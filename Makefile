@@ -4,10 +4,11 @@
 # make test-4.5    the tests on Blender 4.5 as well
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
+# make accuracy    measure the samples against Cycles, for docs/accuracy.md: takes long
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-3.13 test-4.5 lint samples extension test-gui clean
+.PHONY: bake test test-3.13 test-4.5 lint samples extension accuracy test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
@@ -46,6 +47,9 @@ extension: .venv/ready
 
 samples: .venv-4.5/ready
 	for script in $$(grep -l __main__ sample_blends/*.py); do .venv-4.5/bin/python $$script || exit 1; done
+
+accuracy: .venv/ready
+	.venv/bin/python docs/measure.py
 
 test-gui: extension
 	tests/gui/run

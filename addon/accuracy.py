@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import perf_counter, process_time
-from zipfile import BadZipFile
 
 import bpy
 import numpy as np
@@ -154,8 +153,9 @@ def _reference(asked: Asked, context: bpy.types.Context, scene: Scene, say: Call
     """From the output folder if the file and all that matters are the same as then, since nothing costs more."""
     points = scatter(scene, asked.points, _SEED)
     path = asked.folder / f"reference-{_key(asked, scene)}.npz"
-    radiance = _stored(path)
-    if radiance is not None:
+    if path.exists():
+        with np.load(path) as stored:
+            radiance = stored["radiance"]
         say(f"Reference: taken from {path.name}.")
     else:
         begun = perf_counter()
@@ -163,18 +163,11 @@ def _reference(asked: Asked, context: bpy.types.Context, scene: Scene, say: Call
         radiance = true_radiance(context, scene, points, samples=asked.samples, seed=_SEED, threads=threads)
         if not radiance.any():
             raise SceneError("Cycles finds no light on these objects: check the lamps, the world and the materials.")
-        np.savez_compressed(path, radiance=radiance, position=points.position)
+        unfinished = path.with_suffix(".part.npz")
+        np.savez_compressed(unfinished, radiance=radiance, position=points.position)
+        unfinished.replace(path)
         say(f"Reference: {asked.points:,} points by Cycles in {perf_counter() - begun:.1f} s.")
     return Reference(scene, points, radiance, visible(scene, points, radiance))
-
-
-def _stored(path: Path) -> Float64 | None:
-    """The radiance in a file of an earlier run; None where there is none, or it broke off while writing."""
-    try:
-        with np.load(path) as stored:
-            return stored["radiance"]
-    except (OSError, ValueError, KeyError, BadZipFile):
-        return None
 
 
 def _key(asked: Asked, scene: Scene) -> str:

@@ -311,8 +311,8 @@ def _add_accuracy_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--triangles", type=_whole, help=f"of the middle step ({_TRIANGLES:,}; quick {QUICK.triangles:,})"
     )
-    parser.add_argument("--points", type=_whole, help="where bakes are compared with the truth (4,000; quick 1,000)")
-    parser.add_argument("--samples", type=_whole, help="paths for each of a point's three estimates (512; quick 64)")
+    parser.add_argument("--points", type=_count, help="where bakes are compared with the truth (4,000; quick 1,000)")
+    parser.add_argument("--samples", type=_count, help="paths for each of a point's three estimates (512; quick 64)")
     parser.add_argument(
         "--processor-time", action="store_true", help="plot processor seconds: for a machine that others use as well"
     )
@@ -360,6 +360,13 @@ def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value <= 0:
+        raise argparse.ArgumentTypeError(f"{text} is not above 0")
     return value
 
 
