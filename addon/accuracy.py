@@ -117,11 +117,12 @@ def _cycles(
     begun, busy = perf_counter(), process_time()
     corners = corner_bake(bpy.context, copies, samples=samples, seed=_SEED + 1, threads=threads)
     seconds, busy = perf_counter() - begun, process_time() - busy
+    ours = {own.name: own for own in baked}
     objects = []
-    for own, source, values in zip(baked, sources, corners, strict=True):
+    for source, values in zip(sources, corners, strict=True):
         turn = [0, 2, 1] if source.flipped else [0, 1, 2]
         layer = values.reshape(-1, 3, 3)[:, turn].astype(np.float32)
-        objects.append(replace(own, layers={"combined": layer}))
+        objects.append(replace(ours[source.name], layers={"combined": layer}))
     return _step("Cycles", f"{samples:,} samples", reference, objects, seconds, busy)
 
 

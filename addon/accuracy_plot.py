@@ -91,7 +91,7 @@ def _panel(axis: Any, heading: str, steps: Sequence[Step], measure: Measure, clo
     if any(getattr(step, measure) > _TOP for step in shown):
         axis.set_ylim(top=_TOP)
         axis.annotate("off the scale", (0.99, 0.975), xycoords="axes fraction", fontsize=8, ha="right", va="top")
-    axis.set_title(heading, fontsize=10.5)
+    axis.set_title(heading, fontsize=10.5, pad=12)
     axis.set_ylabel("true error, relative to the mean radiance")
 
 

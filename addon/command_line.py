@@ -179,6 +179,8 @@ def _settings(options: argparse.Namespace) -> Settings:
     asked = {"seconds": options.seconds, "error": None} if options.seconds else {"error": options.error}
     return Settings(
         tessellate=options.result != "keep",
+        size=options.size,
+        triangles=options.triangles,
         seed=options.seed,
         threads=options.threads,
         layers=options.layers,
@@ -330,6 +332,14 @@ def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
         default="new",
         help="light the mesh's own corners, tessellate the mesh, or (the default) add a tessellated copy",
     )
+    fineness = parser.add_mutually_exclusive_group()
+    fineness.add_argument(
+        "--triangles",
+        type=_count,
+        default=Settings.triangles,
+        help=f"that would cover the objects, before shadow edges are split finer ({Settings.triangles:,})",
+    )
+    fineness.add_argument("--size", type=_positive, metavar="METRES", help="longest edge of a triangle to use instead")
     layers = f"besides combined, any of {', '.join(layer for layer in LAYERS if layer != 'combined')}"
     parser.add_argument("--layers", type=_layers, default=Settings.layers, metavar="A,B", help=layers)
 

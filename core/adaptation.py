@@ -84,8 +84,10 @@ class Adaptation:
                 break
             # What is hidden beside a contact must not be coarse either: its dark would reach far, or light reach in.
             split |= hidden & _touching(receivers, contact)
+            # A boundary that points have missed in one cell shows in its neighbours, so these are looked at again.
+            doubtful = _touching(receivers, split)
             receivers, source = split_cells(receivers, split)
-            fresh, hidden = np.flatnonzero(split[source]), hidden[source]
+            fresh, hidden = np.flatnonzero(doubtful[source]), hidden[source]
         return receivers
 
     def refine_patches(self, scene: Scene, patches: Patches, split: PatchMeshes, limit: int) -> PatchMeshes:

@@ -49,7 +49,7 @@ def bake(
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
-            limit = int(effort.growth * max(len(receivers.cells), effort.triangles))
+            limit = len(receivers.cells) + int(effort.growth * effort.triangles)
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
             receivers = adaptation.refine_receivers(receivers, limit, effort.error)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)

@@ -29,10 +29,11 @@ _TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 class SurfacePoints:
     """Points (p,) on the receivers, evenly by area.
 
-    receiver (p,) int32 into Scene.receivers(); triangle (p,) int32 of it; barycentric (p, 3) there; position (p, 3) in
+    receiver (p,) int32 into names, those of Scene.receivers(); triangle (p,) int32 of it; barycentric (p, 3) there; position (p, 3) in
     world space; normal (p, 3) of the triangle and shading (p, 3), the shading normal, both of length 1.
     """
 
+    names: tuple[str, ...]
     receiver: Int32
     triangle: Int32
     barycentric: Float64
@@ -83,6 +84,7 @@ def scatter(scene: Scene, count: int, seed: int) -> SurfacePoints:
     own_corners = np.concatenate(corners)[chosen]
     smooth = np.einsum("pc,pck->pk", barycentric, np.concatenate(shading)[chosen])
     return SurfacePoints(
+        tuple(r.name for r in receivers),
         receiver.astype(np.int32),
         (chosen - first[receiver]).astype(np.int32),
         barycentric,
@@ -93,10 +95,10 @@ def scatter(scene: Scene, count: int, seed: int) -> SurfacePoints:
 
 
 def radiance_at(objects: Sequence[BakedObject], points: SurfacePoints, layer: str = "combined") -> Float64:
-    """The interpolated layer (p, 3) of a bake at the points; objects in the order of Scene.receivers()."""
+    """The interpolated layer (p, 3) of a bake at the points; objects in any order."""
     values = np.zeros((len(points), 3))
-    for number, baked in enumerate(objects):
-        own = np.flatnonzero(points.receiver == number)
+    for baked in objects:
+        own = np.flatnonzero(points.receiver == points.names.index(baked.name))
         element, weights = locate(baked, points.triangle[own], points.barycentric[own])
         values[own] = np.einsum("pc,pck->pk", weights, baked.layers[layer][element].astype(np.float64))
     return values

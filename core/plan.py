@@ -37,7 +37,7 @@ class Effort:
     """How hard a bake works.
 
     error: relative, to aim at; triangles: that would cover the receivers, where no size is asked for; growth: how many
-    times as many adaptation may make of them; patches: wanted number; transport_rays: of a patch side; shadow_rays: to
+    times as many adaptation may add; patches: wanted number; transport_rays: of a patch side; shadow_rays: to
     a lamp with size; gather_rays: of a sample point; passes over all cells before the error is first estimated,
     boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the solve;
     threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be lamps.
@@ -89,7 +89,7 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     # Too little time for all: fewer triangles and patches, down to where they would show nothing any more.
     share = max(settings.seconds / planned.seconds, 0.02)
     patches = max(int(effort.patches * share), min(effort.patches, _FEWEST))
-    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), growth=1.2, patches=patches)
+    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), growth=0.3, patches=patches)
     return replace(_priced(scene, settings, effects, fewer), seconds=settings.seconds)
 
 
@@ -116,7 +116,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
-        gather_rays=32,
+        gather_rays=64,
         passes=2,
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),

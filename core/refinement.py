@@ -18,7 +18,7 @@ from .settings import Settings
 from .survey import Survey
 
 #: Sampling and resolution share the asked error; below this share of the resolution, sampling no longer shows.
-_SAMPLING_SHARE, _RESOLUTION_SHARE = 0.7, 0.35
+_SAMPLING_SHARE, _RESOLUTION_SHARE = 0.7, 0.5
 _MOST_ROUNDS, _MOST_PASSES = 3, 128
 
 

@@ -63,7 +63,9 @@ def _warnings(settings: Settings, light: Light) -> list[str]:
         remedy = {
             "sampling": "allow more time",
             "transport": "ask for a smaller error, which makes the patches finer",
-            "resolution": "use smaller triangles",
+            "resolution": "use more and smaller triangles"
+            if settings.tessellate
+            else "subdivide the mesh, or do not keep it",
         }[cause]
         warnings.append(
             f"The estimated error is {light.error.total:.1%}, more than the {settings.error:.1%} asked for; most of it "
