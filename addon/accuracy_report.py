@@ -24,7 +24,7 @@ _COLUMNS = (
     ("processor s", "right"),
     ("surface error", "right"),
     ("typical", "right"),
-    ("inside solids too", "right"),
+    ("dark points too", "right"),
     ("bias", "right"),
     ("stated", "right"),
     ("stated / true", "right"),
@@ -46,10 +46,10 @@ def markdown(asked: Asked, reference: Reference, steps: Sequence[Step], clock: C
 
 
 def _reading(asked: Asked, reference: Reference, steps: Sequence[Step], clock: Clock) -> str:
-    hidden = 1.0 - reference.visible.mean()
+    dark = 1.0 - reference.visible.mean()
     paths = f"3 x {asked.samples:,} paths of Cycles each"
     lines = [
-        f"Reference: {asked.points:,} points, {paths}, noise {reference.noise:.2%}; {hidden:.1%} lie inside solids.",
+        f"Reference: {asked.points:,} points, {paths}, noise {reference.noise:.2%}; {dark:.1%} get no light.",
         "Errors are relative to the mean radiance. Seconds include reading from and writing to Blender.",
     ]
     front = frontier(steps, clock=clock)

@@ -36,7 +36,7 @@ class Step:
 
     processor_seconds: of all threads together, which other programs on the machine change less. patches and rays are 0
     and estimated_error is None for Cycles, which does not tell. uncertainty: standard error of surface_error. All
-    leave the points inside solids out, which nobody sees; the errors everywhere have them in.
+    leave the points out that get no light at all, mostly inside solids; the errors everywhere have them in.
     """
 
     series: str

@@ -83,12 +83,13 @@ def test_probes_do_not_shade_each_other():
 
 
 @pytest.fixture
-def scene_file(tmp_path: Path, lit_plane, monkeypatch) -> Path:
-    """The plane in a file, and a ladder of few steps for it."""
+def scene_file(tmp_path: Path, lit_plane, add_mesh, monkeypatch) -> Path:
+    """The plane in a file, beside it another that comes first by name only, and a ladder of few steps for them."""
+    add_mesh("Aside", ((4, -2, 0), (8, -2, 0), (8, 2, 0), (4, 2, 0))).data.materials.append(lit_plane.active_material)
     path = tmp_path / f"{lit_plane.name.lower()}.blend"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     tiny = Scale(
-        100, (1.0,), passes=(2,), errors=(0.2,), pair_patches=(20,), thresholds=(1e-3,), cycles=(1,), knobs=False
+        200, (1.0,), passes=(2,), errors=(0.2,), pair_patches=(20,), thresholds=(1e-3,), cycles=(1,), knobs=False
     )
     monkeypatch.setattr(command_line, "QUICK", tiny)
     return path
@@ -118,10 +119,10 @@ def test_the_ladder_is_climbed_and_told(scene_file: Path, capsys):
         "mesh and passes", "asked error", "hemisphere", "analytic", "centroid", "Cycles",
     ]  # fmt: skip
     for step in steps:
-        # Direct light without a shadow, on triangles of less than 0.6 m: linear elements miss at most h^2 / 8 of the
-        # second derivative, which is at most 3/4 of the largest light: 3.4 % of 2.5 times the mean.
-        assert float(step["surface_error"]) < 0.084
-        assert abs(float(step["bias"])) < 0.084
+        # Direct light without a shadow, on triangles with edges h of at most 0.8 m: linear elements miss at most h^2 / 8
+        # of the second derivative, which is at most 3/4 of the largest light: 6 %, and 21 % of the mean on both planes.
+        assert float(step["surface_error"]) < 0.21
+        assert abs(float(step["bias"])) < 0.21
         assert int(step["triangles"]) >= 64
         assert float(step["processor_seconds"]) > 0.0
     assert steps[-1]["estimated_error"] == ""
@@ -211,7 +212,7 @@ def test_the_report_compares_with_cycles_and_judges_honesty():
     asked = accuracy.Asked(Path("room.blend"), Path(), Scale(1), None, 10, 20)
     reference = accuracy.Reference(None, None, np.ones((10, 3, 3)), np.arange(10) > 0)
     text = markdown(asked, reference, steps, "seconds")
-    assert "10.0% lie inside solids" in text
+    assert "10.0% get no light" in text
     assert "takes 30.0 s on the same mesh: its surface error of 5.00% takes 3.0 s here, 10 times as fast" in text
     assert "1 of 2 within 0.7 to 1.5, smallest 0.50, largest 1.00" in text
     table = [line for line in text.splitlines() if line.startswith("|")]
