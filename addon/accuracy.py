@@ -65,7 +65,7 @@ def measure(
     receivers = open_receivers()
     scene, sources = read_scene(context.evaluated_depsgraph_get(), receivers, tessellate=True)
     reference = _reference(asked, context, scene, say)
-    ladder = rungs(asked.scale, asked.settings)
+    ladder = rungs(scene, asked.scale, asked.settings)
     middle = next(rung for rung in ladder if rung.settings.triangles == asked.scale.triangles)
     steps: dict[Rung, Step] = {}
     # The middle comes last, since its mesh is what Cycles bakes next.

@@ -311,7 +311,7 @@ def _add_accuracy_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--output", type=_file(""), metavar="DIR", help="the folder to write to; else IN-accuracy")
     parser.add_argument("--quick", action="store_true", help="few and small steps, a coarse reference")
     parser.add_argument(
-        "--triangles", type=_whole, help=f"of the middle step ({_TRIANGLES:,}; quick {QUICK.triangles:,})"
+        "--triangles", type=_count, help=f"of the middle step ({_TRIANGLES:,}; quick {QUICK.triangles:,})"
     )
     parser.add_argument("--points", type=_count, help="where bakes are compared with the truth (4,000; quick 1,000)")
     parser.add_argument("--samples", type=_count, help="paths for each of a point's three estimates (512; quick 64)")

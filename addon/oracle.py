@@ -95,9 +95,8 @@ def _probes(context: bpy.types.Context, scene: Scene, points: SurfacePoints) -> 
     mesh.update()
     obj = bpy.data.objects.new("Probes", mesh)
     # Rays in fog still see it: what no ray at all can see, Cycles leaves out and does not bake.
-    obj.visible_camera = obj.visible_diffuse = obj.visible_glossy = obj.visible_transmission = obj.visible_shadow = (
-        False
-    )
+    obj.visible_camera = obj.visible_diffuse = obj.visible_glossy = obj.visible_transmission = False
+    obj.visible_shadow = False
     context.scene.collection.objects.link(obj)
     context.view_layer.update()
     try:

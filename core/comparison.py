@@ -29,8 +29,9 @@ _TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
 class SurfacePoints:
     """Points (p,) on the receivers, evenly by area.
 
-    receiver (p,) int32 into names, those of Scene.receivers(); triangle (p,) int32 of it; barycentric (p, 3) there; position (p, 3) in
-    world space; normal (p, 3) of the triangle and shading (p, 3), the shading normal, both of length 1.
+    names of the receivers, as Scene.receivers() has them; receiver (p,) int32 into names; triangle (p,) int32 of it;
+    barycentric (p, 3) there; position (p, 3) in world space; normal (p, 3) of the triangle and shading (p, 3), the
+    shading normal, both of length 1.
     """
 
     names: tuple[str, ...]

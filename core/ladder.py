@@ -88,12 +88,18 @@ KNOBS: dict[str, tuple[int, ...]] = {
     "transport_rays": (16, 256),
     "patches": (2000, 16000),
 }
+#: Triangles up to which all pairs of them are taken: the cost grows with the square, whatever the number of patches.
+MOST_BY_PAIRS = 5_000
 #: Passes of the middle, from which the knobs are turned and the estimators compared.
 _PASSES = 8
+_BY_PAIRS: tuple[Estimator, ...] = ("analytic", "centroid")
 
 
-def rungs(scale: Scale, settings: Settings) -> list[Rung]:
-    """The whole ladder. settings: threads and seed; error, seconds, size, triangles and estimator are the ladder's."""
+def rungs(scene: Scene, scale: Scale, settings: Settings) -> list[Rung]:
+    """The whole ladder. settings: threads and seed; error, seconds, size, triangles and estimator are the ladder's.
+
+    The estimators that take pairs are left out where the scene itself has too many triangles for them.
+    """
     fixed = replace(settings, error=None, seconds=None, size=None, triangles=scale.triangles)
     ladder = []
     for factor in scale.meshes:
@@ -110,10 +116,11 @@ def rungs(scale: Scale, settings: Settings) -> list[Rung]:
             for name, values in KNOBS.items()
             for value in values
         ]
+    pairs = _BY_PAIRS if sum(len(o.triangles) for o in scene.objects) <= MOST_BY_PAIRS else ()
     for patches in scale.pair_patches:
         few = {**middle, "patches": patches}
         ladder.append(Rung("hemisphere", f"{patches:,} patches", fixed, few))
-        for estimator in _BY_PAIRS:
+        for estimator in pairs:
             ladder += [
                 Rung(
                     estimator,
@@ -124,9 +131,6 @@ def rungs(scale: Scale, settings: Settings) -> list[Rung]:
                 for threshold in scale.thresholds
             ]
     return ladder
-
-
-_BY_PAIRS: tuple[Estimator, ...] = ("analytic", "centroid")
 
 
 def frontier(steps: Sequence[Step], measure: Measure = "surface_error", clock: Clock = "seconds") -> list[Step]:

@@ -119,8 +119,9 @@ def test_the_ladder_is_climbed_and_told(scene_file: Path, capsys):
         "mesh and passes", "asked error", "hemisphere", "analytic", "centroid", "Cycles",
     ]  # fmt: skip
     for step in steps:
-        # Direct light without a shadow, on triangles with edges h of at most 0.8 m: linear elements miss at most h^2 / 8
-        # of the second derivative, which is at most 3/4 of the largest light: 6 %, and 21 % of the mean on both planes.
+        # Direct light without a shadow, on triangles with edges h of at most 0.8 m: linear elements miss at most
+        # h^2 / 8 of the second derivative, which is at most 3/4 of the largest light: 6 % of it, and that is 21 % of
+        # the mean on both planes.
         assert float(step["surface_error"]) < 0.21
         assert abs(float(step["bias"])) < 0.21
         assert int(step["triangles"]) >= 64

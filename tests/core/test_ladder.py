@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from radiosity_baker.core import bake as pipeline
-from radiosity_baker.core.ladder import KNOBS, QUICK, Scale, Step, frontier, knee, rungs
+from radiosity_baker.core.ladder import KNOBS, MOST_BY_PAIRS, QUICK, Scale, Step, frontier, knee, rungs
 from radiosity_baker.core.plan import choose_effort
+from radiosity_baker.core.scene import Scene
 from radiosity_baker.core.settings import Settings
 
 
@@ -53,7 +54,7 @@ def test_honesty_is_stated_over_true():
 @pytest.mark.parametrize("scale", [Scale(1000), QUICK])
 def test_every_rung_can_be_climbed(build, scale):
     scene = build.furnished_room()
-    ladder = rungs(scale, Settings(threads=1, seed=5))
+    ladder = rungs(scene, scale, Settings(threads=1, seed=5))
     assert len({(rung.series, rung.label) for rung in ladder}) == len(ladder)
     for rung in ladder:
         assert (rung.settings.threads, rung.settings.seed, rung.settings.seconds) == (1, 5, None)
@@ -64,6 +65,14 @@ def test_every_rung_can_be_climbed(build, scale):
             assert getattr(effort, name) == value
 
 
+def test_pairs_are_not_taken_where_there_are_too_many(build):
+    few, many = (Scene((build.sphere(level=level),), (build.grey,)) for level in (4, 5))
+    assert len(few.objects[0].triangles) < MOST_BY_PAIRS < len(many.objects[0].triangles)
+    series = [{rung.series for rung in rungs(scene, Scale(1000), Settings())} for scene in (few, many)]
+    assert series[0] - series[1] == {"analytic", "centroid"}
+    assert "hemisphere" in series[1]
+
+
 def test_knobs_are_turned_away_from_the_usual_to_both_sides(build):
     usual = choose_effort(build.furnished_room(), Settings(error=None))
     for name, values in KNOBS.items():
@@ -72,7 +81,7 @@ def test_knobs_are_turned_away_from_the_usual_to_both_sides(build):
 
 def test_a_forced_effort_is_the_effort_of_the_bake(build):
     scene = build.furnished_room()
-    rung = rungs(Scale(100, passes=(2, 4)), Settings(threads=1))[0]
+    rung = rungs(scene, Scale(100, passes=(2, 4)), Settings(threads=1))[0]
     few = pipeline.bake(scene, rung.settings, effort=build.effort(patches=60, passes=2)).report
     more = pipeline.bake(scene, rung.settings, effort=build.effort(patches=240, passes=4)).report
     assert few.patches < more.patches / 2
