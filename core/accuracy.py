@@ -47,7 +47,7 @@ class ErrorEstimate:
 
 
 #: How much the fit may weigh smoothness, from hardly to a lot.
-ALPHAS = (1e-3, 0.05, 0.5, 3.0)
+ALPHAS = (0.02, 0.5, 5.0)
 
 
 def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:

@@ -8,8 +8,10 @@ matters or there are as many as allowed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight
 from .direct.lamps import Light
@@ -28,6 +30,9 @@ from .visibility import Visibility
 LEVELS, PATCH_LEVELS = 4, 3
 #: How far light may jump inside a patch, relative to the mean: what patches send out is blurred by distance.
 _PATCH_STEP = 0.5
+#: How far light may jump inside a cell, relative to the mean and to the error asked for: few cells are crossed, and
+#: what the fit leaves of a jump is a fraction of it.
+_BOUNDARY_STEP = 12.0
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
 #: lamp with size.
 _POINTS, _RAYS, _SHADOW_RAYS = 4, 8, 4
@@ -75,11 +80,13 @@ class Adaptation:
 
     def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
         """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
-        first = self._probe(receivers.cells, np.arange(len(receivers.cells)), 0, 1)
-        fresh, hidden = _on_borders(receivers, first), first.hidden[0]
-        mean, fair = _fair_share(receivers.cells.area, first.direct[0], 7.0 * error)
+        every = np.arange(len(receivers.cells))
+        first = self._probe(receivers.cells, every, 0, 1, every >= 0)
+        mean, fair = _fair_share(receivers.cells.area, first.direct[0], _BOUNDARY_STEP * error)
+        fresh, hidden = _on_borders(receivers, first, fair), first.hidden[0]
         for level in range(LEVELS):
-            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit)
+            near = _touching(receivers, hidden)
+            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit, near)
             if not split.any():
                 break
             # What is hidden beside a contact must not be coarse either: its dark would reach far, or light reach in.
@@ -97,9 +104,10 @@ class Adaptation:
             own = np.flatnonzero(np.bincount(patches.patch)[patches.patch] == 1)
             if not len(own):
                 break
-            light = self._probe(cells, own, 50 + level, 1).direct[0]
+            nowhere = np.zeros(len(cells), dtype=bool)
+            light = self._probe(cells, own, 50 + level, 1, nowhere[own]).direct[0]
             mean, fair = _fair_share(cells.area[own], light, _PATCH_STEP)
-            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit)[0][own]]
+            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit, nowhere)[0][own]]
             if not len(chosen):
                 break
             marked = np.zeros(sum(len(m.triangles) for m in split.meshes), dtype=bool)
@@ -111,13 +119,13 @@ class Adaptation:
         return split
 
     def _worst(
-        self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int
+        self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int, near: Bool
     ) -> tuple[Bool, Bool]:
         """Which cells (c,) to split: of the fresh ones those with the largest squared error, while there is room; and
-        which of them a contact crosses."""
+        which of them a contact crosses. near (c,): cells where there may be one."""
         split, contact = np.zeros((2, len(cells)), dtype=bool)
         if len(fresh):
-            probe = self._probe(cells, fresh, number, _POINTS)
+            probe = self._probe(cells, fresh, number, _POINTS, near[fresh])
             weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
             # A split cell becomes four, and makes its neighbours become two or three.
             most = min(max((limit - len(cells)) // 5, 0), int(np.count_nonzero(weight > fair)))
@@ -125,8 +133,10 @@ class Adaptation:
             contact[fresh[probe.contact()]] = True
         return split, split & contact
 
-    def _probe(self, cells: Cells, chosen: Int64, number: int, count: int) -> _Probe:
+    def _probe(self, cells: Cells, chosen: Int64, number: int, count: int, near: Bool) -> _Probe:
+        """What `count` points of each chosen cell see; near (n,): where they may be inside a solid."""
         shift = stream(self._seed, f"adaptation {number}").random((len(cells), 2))
+        near_contact = np.flatnonzero(near)
         seen = []
         for k in range(count):
             points = Points(cells, chosen, k, shift)
@@ -134,11 +144,13 @@ class Adaptation:
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
             direct = light.irradiance.mean(axis=1)
             hidden = np.zeros(len(chosen), dtype=bool)
-            if self._around is not None:
+            if self._around is not None and len(near_contact):
+                some = Points(cells, chosen[near_contact], k, shift)
                 arriving, _, enclosed = gather_indirect(
-                    points, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
+                    some, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
                 )
-                hidden = inside_solid(enclosed, arriving[:, :-1] @ self._around.to_grey, direct)
+                grey = arriving[:, :-1] @ self._around.to_grey
+                hidden[near_contact] = inside_solid(enclosed, grey, direct[near_contact])
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
@@ -170,14 +182,25 @@ def _touching(receivers: Receivers, chosen: Bool) -> Bool:
     return np.asarray(touched[corner].any(axis=1))
 
 
-def _on_borders(receivers: Receivers, probe: _Probe) -> Int64:
-    """Cells (n,) that see some light in part, or share a vertex with a cell that sees other lights or is hidden."""
+def _on_borders(receivers: Receivers, probe: _Probe, fair: float) -> Int64:
+    """Cells (n,) that share a vertex with hidden and open cells, or with cells that see other lights or see them in
+    part, if light differs among them by enough to matter."""
     corner = receivers.corner_vertex[receivers.cells.element]
-    # Hidden cells are dark as well, so a number of their own tells them from cells in shadow.
-    seen = np.where(probe.hidden[0], np.iinfo(np.int64).max, probe.signature[0])
-    low = np.full(receivers.vertices, np.iinfo(np.int64).max)
-    high = np.full(receivers.vertices, np.iinfo(np.int64).min)
-    for k in range(3):
-        np.minimum.at(low, corner[:, k], seen)
-        np.maximum.at(high, corner[:, k], seen)
-    return np.flatnonzero(((low < 0) | (low != high))[corner].any(axis=1))
+
+    def extremes(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Smallest and largest value (c,) among the cells around each vertex."""
+        low, high = np.full((2, receivers.vertices), values[0])
+        for k in range(3):
+            low[corner[:, k]] = high[corner[:, k]] = values
+        for k in range(3):
+            np.minimum.at(low, corner[:, k], values)
+            np.maximum.at(high, corner[:, k], values)
+        return low, high
+
+    least, most = extremes(probe.hidden[0].astype(np.int8))
+    contact = (least != most)[corner].any(axis=1)
+    low, high = extremes(probe.signature[0])
+    crossed = ((low < 0) | (low != high))[corner].any(axis=1)
+    dark, bright = extremes(probe.direct[0])
+    step = (bright - dark)[corner].max(axis=1)
+    return np.flatnonzero(contact | (crossed & (step**2 * receivers.cells.area > fair)))

@@ -13,7 +13,7 @@ from .scene import Bool, Float32, Float64
 
 #: Share of rays that must meet backs before a dark point counts as inside a solid.
 _ENCLOSED = 0.75
-_CHUNK = 2048
+_CHUNK = 8192
 
 
 class Points:

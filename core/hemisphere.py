@@ -15,8 +15,8 @@ from .sampling import cosine_patterns, frames
 from .scene import Float32, Float64
 from .visibility import Visibility, offset_along
 
-#: Rays a chunk: its directions and hits then stay in a core's second-level cache.
-CHUNK_RAYS = 16384
+#: Rays a chunk: few enough to stay in the processor's caches, enough that Python hardly counts.
+CHUNK_RAYS = 65536
 _PATTERNS = 256
 
 

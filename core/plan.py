@@ -116,7 +116,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
-        gather_rays=64,
+        gather_rays=32,
         passes=2,
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),
