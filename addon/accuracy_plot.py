@@ -58,7 +58,7 @@ def draw(path: Path, title: str, steps: Sequence[Step], clock: Clock) -> None:
 
 
 def _panel(axis: Any, heading: str, steps: Sequence[Step], measure: Measure, clock: Clock) -> None:
-    shown = [step for step in steps if getattr(step, measure) > 0.0]
+    shown = [step for step in steps if step.measurable and getattr(step, measure) > 0.0]
     best = frontier(shown, measure, clock)
     axis.plot(
         [getattr(s, clock) for s in best],

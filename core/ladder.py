@@ -55,9 +55,14 @@ class Step:
     estimated_error: float | None
 
     @property
+    def measurable(self) -> bool:
+        """Whether the error stands out from the noise of its own measurement."""
+        return self.surface_error > 2.0 * self.uncertainty
+
+    @property
     def honesty(self) -> float | None:
-        """Stated over true error: 1 is right, less is boasting. None where either is missing."""
-        if self.estimated_error is None or self.surface_error <= 0.0:
+        """Stated over true error: 1 is right, less is boasting. None where either is not known."""
+        if self.estimated_error is None or not self.measurable:
             return None
         return self.estimated_error / self.surface_error
 
@@ -134,11 +139,11 @@ def rungs(scene: Scene, scale: Scale, settings: Settings) -> list[Rung]:
 
 
 def frontier(steps: Sequence[Step], measure: Measure = "surface_error", clock: Clock = "seconds") -> list[Step]:
-    """The steps that no other beats in both time and error, fastest first. Errors too small to measure are left out."""
+    """The steps that no other beats in both time and error, fastest first; only those whose error can be measured."""
     best: list[Step] = []
     for step in sorted(steps, key=lambda s: (getattr(s, clock), getattr(s, measure))):
         error = getattr(step, measure)
-        if error > 0.0 and (not best or error < getattr(best[-1], measure)):
+        if step.measurable and (not best or error < getattr(best[-1], measure)):
             best.append(step)
     return best
 

@@ -19,8 +19,8 @@ def step(seconds, error, **more) -> Step:
 def test_the_frontier_holds_what_nothing_else_beats():
     good = [step(1.0, 0.3), step(2.0, 0.2), step(8.0, 0.1)]
     beaten = [step(1.0, 0.4), step(3.0, 0.2), step(9.0, 0.15)]
-    # An error below what the reference can resolve is no error of zero.
-    unknown = [step(0.5, 0.0)]
+    # An error below what the reference can resolve is not the smallest.
+    unknown = [step(0.5, 0.0), step(9.0, 0.05, uncertainty=0.03)]
     assert frontier([*beaten, *unknown, *good[::-1]]) == good
 
 
@@ -49,6 +49,7 @@ def test_honesty_is_stated_over_true():
     assert step(1.0, 0.2, estimated_error=0.1).honesty == pytest.approx(0.5)
     assert step(1.0, 0.2).honesty is None
     assert step(1.0, 0.0, estimated_error=0.1).honesty is None
+    assert step(1.0, 0.2, estimated_error=0.1, uncertainty=0.11).honesty is None
 
 
 @pytest.mark.parametrize("scale", [Scale(1000), QUICK])
