@@ -34,7 +34,11 @@ ALONE, BESIDE, GAP = 780, 520, 20
 LIFT = 3.0
 
 
-def bake(sample: str, name: str) -> list[bpy.types.Object]:
+#: Triangles for scenes with many sharp shadows; a preview needs fewer.
+MANY = 150_000
+
+
+def bake(sample: str, name: str, triangles: int = 50_000) -> list[bpy.types.Object]:
     """Bake a sample by the command line, open what it wrote, and return the objects that carry the light."""
     baked = BAKES / f"{name}.blend"
     code = command_line.run(
@@ -45,6 +49,7 @@ def bake(sample: str, name: str) -> list[bpy.types.Object]:
             f"--preview={BAKES / name}.png",
             f"--report={BAKES / name}.json",
             f"--layers={','.join(LAYERS)}",
+            f"--triangles={triangles}",
         ]
     )
     if code:
@@ -61,7 +66,7 @@ def cornell_box() -> None:
 
 
 def living_room() -> None:
-    objects = bake("living_room", "living_room")
+    objects = bake("living_room", "living_room", MANY)
     save([BAKES / "living_room.png"], IMAGES / "living_room.png", width=ALONE)
     paint_materials(objects, "Unlit")
     save(
@@ -73,7 +78,7 @@ def living_room() -> None:
 
 
 def stage() -> None:
-    bake("stage", "stage")
+    bake("stage", "stage", MANY)
     save([BAKES / "stage.png"], IMAGES / "stage.png", width=ALONE)
 
 
