@@ -44,6 +44,7 @@ def draw(path: Path, title: str, steps: Sequence[Step], clock: Clock) -> None:
     try:
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415 - only who plots needs it
         from matplotlib.figure import Figure  # noqa: PLC0415
+        from matplotlib.ticker import LogLocator  # noqa: PLC0415
     except ImportError as missing:
         raise NoPlotting("No plot was drawn, since matplotlib is not installed.") from missing
     figure = Figure(figsize=(12.5, 6.2), layout="constrained", facecolor="white")
@@ -52,6 +53,8 @@ def draw(path: Path, title: str, steps: Sequence[Step], clock: Clock) -> None:
     axes = figure.subplots(1, 2)
     for axis, (measure, heading) in zip(axes, _AXES, strict=True):
         _panel(axis, heading, steps, measure, clock)
+        for direction in (axis.xaxis, axis.yaxis):
+            direction.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5, frameon=False, fontsize=9)
     figure.savefig(path, format="png", dpi=110, metadata={"Software": None})
@@ -62,7 +65,7 @@ def _panel(axis: Any, heading: str, steps: Sequence[Step], measure: Measure, clo
     best = frontier(shown, measure, clock)
     axis.plot(
         [getattr(s, clock) for s in best],
-        [getattr(s, measure) for s in best],
+        [min(getattr(s, measure), _TOP) for s in best],
         color="#222222",
         linewidth=1.2,
         alpha=0.7,
