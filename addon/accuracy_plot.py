@@ -31,7 +31,7 @@ _AXES: tuple[tuple[Measure, str], ...] = (
     ("typical_error", "Typical error: without the worst 2 % of the points"),
 )
 #: Errors above this are off the scale; their marks stand on the upper edge.
-_TOP = 1.0
+_TOP = 3.0
 _CLOCKS = {"seconds": "seconds", "processor_seconds": "processor seconds"}
 
 
