@@ -243,7 +243,7 @@ def test_neither_scale_nor_place_matter(room, scale, offset):
     scene = replace(room, lamps=(*room.lamps, lamp))
     here = values(preview(scene, tessellate=False))
     there = values(preview(moved(scene, scale, offset), tessellate=False))
-    assert there == pytest.approx(here, abs=1e-3 * here.max())
+    assert there == pytest.approx(here, abs=1e-3 * float(here.max()))
 
 
 def test_a_scene_too_far_away_is_baked_with_a_warning(build):
