@@ -50,25 +50,6 @@ def polygon_irradiance(
     return result
 
 
-def polygon_solid_angle(points: ArrayLike, polygon: ArrayLike) -> Float64:
-    """Solid angle of convex polygons (..., v, 3) seen from points (..., 3), in sr, 0 to 2 pi; broadcast as above.
-
-    A. van Oosterom and J. Strackee, The solid angle of a plane triangle (1983), over the polygon's fan.
-    """
-    x, corners = np.asarray(points, dtype=np.float64), np.asarray(polygon, dtype=np.float64)
-    a = corners - x[..., None, :]
-    length = np.sqrt(_dot(a, a))
-    apex, left, right = a[..., :1, :], a[..., 1:-1, :], a[..., 2:, :]
-    volume = _dot(apex, np.cross(left, right))
-    span = (
-        length[..., :1] * length[..., 1:-1] * length[..., 2:]
-        + _dot(apex, left) * length[..., 2:]
-        + _dot(apex, right) * length[..., 1:-1]
-        + _dot(left, right) * length[..., :1]
-    )
-    return np.asarray(np.abs(2.0 * np.arctan2(volume, span).sum(axis=-1)))
-
-
 def _dot(a: Float64, b: Float64) -> Float64:
     return np.asarray(np.einsum("...i,...i->...", a, b))
 

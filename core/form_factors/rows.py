@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -47,22 +46,6 @@ class Rows:
         merged = _segment_sums(np.asarray(weights, dtype=np.float64)[order], first)
         return Rows(_pointers(np.bincount(row, minlength=count)), column.astype(np.int32), merged.astype(np.float32))
 
-    @staticmethod
-    def stack(parts: Sequence[Rows], count: int) -> Rows:
-        """The rows of all parts, one after another. Raises ValueError if they are not `count` rows."""
-        if sum(len(part) for part in parts) != count:
-            raise ValueError(f"{sum(len(part) for part in parts)} rows where {count} were expected")
-        lengths = np.concatenate([np.diff(part.indptr) for part in parts])
-        columns = np.concatenate([part.columns for part in parts])
-        return Rows(_pointers(lengths), columns, np.concatenate([part.weights for part in parts]))
-
-    def renumber(self, number: Int32) -> Rows:
-        """Column c becomes number[c]; entries whose new number is negative are left out."""
-        columns = number[self.columns]
-        kept = columns >= 0
-        lengths = np.bincount(self.owners()[kept], minlength=len(self))
-        return Rows(_pointers(lengths), columns[kept].astype(np.int32), self.weights[kept])
-
     def owners(self) -> Int64:
         """(entries,) the row each entry belongs to."""
         return np.repeat(np.arange(len(self)), np.diff(self.indptr))
@@ -104,12 +87,6 @@ class Rows:
             for _ in workers.map(work, len(self), chunk):
                 pass
         return result.T.reshape(len(self), *values.shape[1:])
-
-    def transpose(self, count: int) -> Rows:
-        """The transposed matrix, which has `count` rows: as many as this one has columns."""
-        order = np.argsort(self.columns, kind="stable")
-        lengths = np.bincount(self.columns, minlength=count)
-        return Rows(_pointers(lengths), self.owners()[order].astype(np.int32), self.weights[order])
 
 
 def symmetric_exchange(rows: Rows, areas: ArrayLike, samples: ArrayLike = 1.0) -> Rows:

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from radiosity_baker.core.form_factors.polygon import polygon_irradiance, polygon_solid_angle
+from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 
 UP = np.array([0.0, 0.0, 1.0])
 #: A square of side 1 over the origin's first quadrant, shining down, and one standing along the y axis, shining to -x.
@@ -155,8 +155,3 @@ def test_a_turned_shifted_scaled_scene_is_the_same(seed: int) -> None:
     here = polygon_irradiance(point, normal, corners)
     there = polygon_irradiance(scale * point @ turn + shift, normal @ turn, scale * corners @ turn + shift)
     assert there == pytest.approx(here, abs=1e-6)
-
-
-def test_solid_angle_of_a_cube_s_face_from_its_centre() -> None:
-    face = (CEILING - (0.5, 0.5, 0)) * (2, 2, 1)
-    assert polygon_solid_angle(np.zeros((5, 3)), face) == pytest.approx(np.full(5, 4 * np.pi / 6), abs=1e-12)

@@ -47,7 +47,6 @@ def test_is_the_dense_matrix(seed: int, count: int, width: int) -> None:
     assert rows.apply(x[:, 0]) == pytest.approx(matrix @ x[:, 0], abs=1e-12)
     assert rows.row_sums() == pytest.approx(matrix.sum(1), abs=1e-12)
     assert (dense(rows, width) == matrix).all()
-    assert (dense(rows.transpose(width), count) == matrix.T).all()
 
 
 def test_entries_of_one_place_add_up() -> None:
@@ -59,16 +58,6 @@ def test_no_entries_at_all() -> None:
     rows = Rows.from_triplets([], [], [], 3)
     assert rows.apply(np.ones((5, 2))).tolist() == [[0, 0]] * 3
     assert (balance(rows, np.ones(3)).weights == 0).all()
-
-
-def test_stack_and_renumber() -> None:
-    matrix = random_matrix(3, 9, 6)
-    rows = Rows.stack([sparse(matrix[:4]), sparse(matrix[4:])], 9)
-    assert (dense(rows, 6) == matrix).all()
-    number = np.array([2, -1, 0, 1, -1, 3], dtype=np.int32)
-    assert (dense(rows.renumber(number), 4) == matrix[:, [2, 3, 0, 5]]).all()
-    with pytest.raises(ValueError, match="9 rows where 8"):
-        Rows.stack([rows], 8)
 
 
 def test_threads_give_the_same_bytes() -> None:
