@@ -35,8 +35,8 @@ def bake(
     """
     clock = Clock(progress or Progress())
     with clock.stage("plan", 0.0):
-        scene = check_scene(scene)
-        planned = plan(scene, settings, effort)
+        planned = plan(check_scene(scene), settings, effort)
+    scene = planned.scene
     effort, sky = planned.effort, np.array(scene.sky)
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import ceil, log
 from time import perf_counter
 
 import numpy as np
 
+from .effects import MOST_PANELS, choose_effects, emitting_triangles
 from .parallel import Workers, thread_count
-from .patches import Space, make_patches, split_objects, triangle_geometry, unit_space
+from .patches import Space, make_patches, split_objects, unit_space
 from .progress import Progress
 from .result import Effect
 from .sampling import stream
-from .scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp
+from .scene import Scene
 from .settings import Settings
 from .tessellation import edge_for_count, predicted_count
 from .visibility import Visibility
 
-#: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
-MOST_PANELS = 64
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky", "emitting surfaces")
 #: Triangles and patches below which a bake shows next to nothing.
@@ -60,8 +58,10 @@ class Effort:
 
 @dataclass(frozen=True)
 class Plan:
-    """effects with their reasons; how hard to work; and the cost predicted from a short calibration of this machine."""
+    """scene: with nothing in it but the effects that are simulated; effects with their reasons; how hard to work; and the
+    cost predicted from a short calibration of this machine."""
 
+    scene: Scene
     effects: tuple[Effect, ...]
     effort: Effort
     cells: int
@@ -71,7 +71,11 @@ class Plan:
     @property
     def looks_around(self) -> bool:
         """Whether any effect needs rays over the hemisphere."""
-        return any(e.active for e in self.effects if e.name in LOOKING)
+        return any(self.active(name) for name in LOOKING)
+
+    def active(self, name: str) -> bool:
+        """Whether an effect is simulated."""
+        return next(effect.active for effect in self.effects if effect.name == name)
 
 
 def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan:
@@ -79,7 +83,7 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
 
     effort: to work just so hard, instead of as hard as the settings call for.
     """
-    effects = choose_effects(scene, settings)
+    effects, scene = choose_effects(scene, settings)
     if effort is not None:
         return _priced(scene, settings, effects, effort)
     effort = choose_effort(scene, settings)
@@ -97,7 +101,7 @@ def _priced(scene: Scene, settings: Settings, effects: tuple[Effect, ...], effor
     receivers = scene.receivers()
     vertices, triangles = [o.vertices for o in receivers], [o.triangles for o in receivers]
     edge = settings.size or edge_for_count(vertices, triangles, effort.triangles)
-    unpriced = Plan(effects, effort, predicted_count(vertices, triangles, edge), 0.0, 0.0)
+    unpriced = Plan(scene, effects, effort, predicted_count(vertices, triangles, edge), 0.0, 0.0)
     seconds, memory = predict(scene, settings, unpriced)
     return replace(unpriced, seconds=seconds, memory_mb=memory)
 
@@ -123,46 +127,6 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         threshold=1e-5,
         emitters_by_rays=emitting_triangles(scene) > MOST_PANELS,
     )
-
-
-def choose_effects(scene: Scene, settings: Settings) -> tuple[Effect, ...]:
-    """Each effect, whether this scene calls for it, and why."""
-    lamps = scene.lamps
-    kinds = (("point lamps", PointLamp), ("spot lamps", SpotLamp), ("sun", SunLamp), ("area lamps", AreaLamp))
-    effects = [_counted(name, [lamp.name for lamp in lamps if isinstance(lamp, kind)]) for name, kind in kinds]
-    soft = [lamp.name for lamp in lamps if isinstance(lamp, AreaLamp) or getattr(lamp, "radius", 0.0) > 0]
-    soft += [lamp.name for lamp in lamps if isinstance(lamp, SunLamp) and lamp.angle > 0]
-    effects.append(
-        Effect("soft shadows", bool(soft), f"{_names(soft)} {'has' if len(soft) == 1 else 'have'} a size")
-        if soft
-        else Effect("soft shadows", False, "no lamp has a size")
-    )
-    emitting = emitting_triangles(scene)
-    how = "as lamps" if emitting <= MOST_PANELS else "by the rays that look around"
-    effects.append(
-        Effect("emitting surfaces", True, f"{emitting} triangles emit; sampled {how}")
-        if emitting
-        else Effect("emitting surfaces", False, "no surface emits")
-    )
-    sky = max(scene.sky) > 0
-    effects.append(Effect("sky", sky, "the world emits light" if sky else "the world is black"))
-    used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
-    albedo = max((max(scene.surfaces[i].albedo) for i in used), default=0.0)
-    mean = _mean_albedo(scene)
-    if albedo <= 0:
-        effects.append(Effect("bounces", False, "every surface is black"))
-    elif settings.estimator == "centroid":
-        effects.append(Effect("bounces", True, "as the original program did: centroid form factors, plain shooting"))
-    else:
-        matter = max(1, ceil(log(0.002) / log(mean))) if 0 < mean < 1 else 1
-        effects.append(Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter"))
-    return tuple(effects)
-
-
-def emitting_triangles(scene: Scene) -> int:
-    """How many triangles emit light."""
-    emits = np.array([max(s.emission) > 0 for s in scene.surfaces])
-    return sum(int(np.count_nonzero(emits[o.surface])) for o in scene.objects)
 
 
 def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[float, float]:
@@ -194,22 +158,3 @@ def _seconds_per_ray(scene: Scene, space: Space, threads: int) -> float:
         for _ in workers.map(lambda *_: visibility.nearest(*rays), threads, 1):
             pass
         return (perf_counter() - begun) / (threads * _CALIBRATION_RAYS)
-
-
-def _mean_albedo(scene: Scene) -> float:
-    """Mean over the surface and the channels."""
-    albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])
-    total = area = 0.0
-    for scene_object in scene.objects:
-        areas = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
-        total += float(areas @ albedo[scene_object.surface])
-        area += float(areas.sum())
-    return total / area if area else 0.0
-
-
-def _counted(name: str, names: list[str]) -> Effect:
-    return Effect(name, bool(names), _names(names) if names else "none in the scene")
-
-
-def _names(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Literal
 
 Estimator = Literal["auto", "hemisphere", "analytic", "centroid"]
@@ -24,7 +25,8 @@ class Settings:
     """tessellate: split the receivers (results `new` and `replace`), or keep their corners (`keep`).
     size: longest edge of a receiver's triangle, metres; None chooses it so that about `triangles` result.
     error: asked surface error; seconds: asked time. With both None the error of a preview is used; with both set, the
-    bake ends at whichever comes first. threads: 0 takes every core."""
+    bake ends at whichever comes first. threads: 0 takes every core.
+    effects: by name (core.effects.EFFECTS), those to simulate, or not, whatever the scene calls for."""
 
     tessellate: bool = True
     size: float | None = None
@@ -35,3 +37,4 @@ class Settings:
     seed: int = 0
     threads: int = 0
     layers: tuple[str, ...] = ("combined",)
+    effects: Mapping[str, bool] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -92,6 +92,8 @@ def solve_halves(
     """Two independent solutions, each with rays of its own; none when the plan has nothing for rays to look for."""
     if not plan.looks_around:
         return ()
+    if not plan.active("bounces"):
+        patches = replace(patches, albedo=np.zeros_like(patches.albedo))
     return tuple(
         make_transport(patches, visibility, direct_light, sky, plan.effort, workers, seed=seed, purpose=half)
         for half in ("first half", "second half")

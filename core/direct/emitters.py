@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..effects import MOST_PANELS, emitting_triangles
 from ..patches import Space, triangle_geometry
-from ..plan import MOST_PANELS, emitting_triangles
 from ..scene import Scene
 from .lamps import Light, Panel
 

@@ -11,8 +11,8 @@ import pytest
 from radiosity_baker.core.direct.emitters import emitting_panels
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import Space, unit_space
-from radiosity_baker.core.plan import MOST_PANELS
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SunLamp, Surface
 from radiosity_baker.core.visibility import Visibility
 

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, MOST_PANELS, plan
+from radiosity_baker.core.plan import LOOKING, plan
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings

@@ -1,0 +1,180 @@
+"""The effects of light a bake can simulate: whether a scene calls for each, why, and what the scene is without it.
+
+Every effect is a function `judge(scene, settings)` that answers with an `Effect`, and a function `without(scene)` that
+takes it out of the scene: what is not called for is not there for the rest of the bake, and so costs nothing. Effects
+that are ways of computing rather than parts of the scene leave it as it is; the stages ask `Plan.active` for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from math import ceil, log
+
+import numpy as np
+
+from .patches import triangle_geometry
+from .result import Effect
+from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp
+from .settings import Settings
+
+#: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
+MOST_PANELS = 64
+
+
+@dataclass(frozen=True)
+class Rule:
+    """judge: whether the scene calls for the effect, and why. without: the scene when it is left out."""
+
+    judge: Callable[[Scene, Settings], Effect]
+    without: Callable[[Scene], Scene]
+
+
+def choose_effects(scene: Scene, settings: Settings) -> tuple[tuple[Effect, ...], Scene]:
+    """Each effect, whether it is simulated, and why; and the scene without those that are not.
+
+    settings.effects overrides what the scene calls for. Raises SceneError for an effect that does not exist.
+    """
+    for name in settings.effects:
+        if name not in EFFECTS:
+            raise SceneError(f"There is no effect '{name}': choose from {', '.join(EFFECTS)}.")
+    effects = tuple(_overridden(rule.judge(scene, settings), settings.effects) for rule in EFFECTS.values())
+    for effect in effects:
+        if not effect.active:
+            scene = EFFECTS[effect.name].without(scene)
+    return effects, scene
+
+
+def _overridden(effect: Effect, asked: Mapping[str, bool]) -> Effect:
+    active = asked.get(effect.name, effect.active)
+    if active == effect.active:
+        return effect
+    return Effect(effect.name, active, f"switched {'on' if active else 'off'} by hand; {effect.reason}")
+
+
+def point_lamps(scene: Scene, _: Settings) -> Effect:
+    return _lamps("point lamps", PointLamp, scene)
+
+
+def spot_lamps(scene: Scene, _: Settings) -> Effect:
+    return _lamps("spot lamps", SpotLamp, scene)
+
+
+def sun(scene: Scene, _: Settings) -> Effect:
+    return _lamps("sun", SunLamp, scene)
+
+
+def area_lamps(scene: Scene, _: Settings) -> Effect:
+    return _lamps("area lamps", AreaLamp, scene)
+
+
+def soft_shadows(scene: Scene, _: Settings) -> Effect:
+    soft = [lamp.name for lamp in scene.lamps if _has_size(lamp)]
+    if not soft:
+        return Effect("soft shadows", False, "no lamp has a size")
+    return Effect("soft shadows", True, f"{_names(soft)} {'has' if len(soft) == 1 else 'have'} a size")
+
+
+def emitting_surfaces(scene: Scene, _: Settings) -> Effect:
+    emitting = emitting_triangles(scene)
+    if not emitting:
+        return Effect("emitting surfaces", False, "no surface emits")
+    how = "as lamps" if emitting <= MOST_PANELS else "by the rays that look around"
+    return Effect("emitting surfaces", True, f"{emitting} triangles emit; sampled {how}")
+
+
+def sky(scene: Scene, _: Settings) -> Effect:
+    shines = max(scene.sky) > 0
+    return Effect("sky", shines, "the world emits light" if shines else "the world is black")
+
+
+def bounces(scene: Scene, settings: Settings) -> Effect:
+    used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
+    albedo = max((max(scene.surfaces[i].albedo) for i in used), default=0.0)
+    if albedo <= 0:
+        return Effect("bounces", False, "every surface is black")
+    if settings.estimator == "centroid":
+        return Effect("bounces", True, "as the original program did: centroid form factors, plain shooting")
+    mean = _mean_albedo(scene)
+    matter = max(1, ceil(log(0.002) / log(mean))) if 0 < mean < 1 else 1
+    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter")
+
+
+def emitting_triangles(scene: Scene) -> int:
+    """How many triangles emit light."""
+    emits = np.array([max(s.emission) > 0 for s in scene.surfaces])
+    return sum(int(np.count_nonzero(emits[o.surface])) for o in scene.objects)
+
+
+def _lamps(name: str, kind: type, scene: Scene) -> Effect:
+    names = [lamp.name for lamp in scene.lamps if isinstance(lamp, kind)]
+    return Effect(name, bool(names), _names(names) if names else "none in the scene")
+
+
+def _names(names: list[str]) -> str:
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
+def _has_size(lamp: Lamp) -> bool:
+    match lamp:
+        case AreaLamp():
+            return True
+        case SunLamp():
+            return lamp.angle > 0
+        case PointLamp() | SpotLamp():
+            return lamp.radius > 0
+
+
+def _mean_albedo(scene: Scene) -> float:
+    """Mean over the surface and the channels."""
+    albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])
+    total = area = 0.0
+    for scene_object in scene.objects:
+        areas = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
+        total += float(areas @ albedo[scene_object.surface])
+        area += float(areas.sum())
+    return total / area if area else 0.0
+
+
+def _without_lamps(kind: type) -> Callable[[Scene], Scene]:
+    return lambda scene: replace(scene, lamps=tuple(lamp for lamp in scene.lamps if not isinstance(lamp, kind)))
+
+
+def _with_hard_shadows(scene: Scene) -> Scene:
+    """Point-sized lamps of the same power; an area lamp stays, for it has no light without an area."""
+
+    def hard(lamp: Lamp) -> Lamp:
+        match lamp:
+            case SunLamp():
+                return replace(lamp, angle=0.0)
+            case PointLamp() | SpotLamp():
+                return replace(lamp, radius=0.0)
+            case AreaLamp():
+                return lamp
+
+    return replace(scene, lamps=tuple(hard(lamp) for lamp in scene.lamps))
+
+
+def _without_emission(scene: Scene) -> Scene:
+    return replace(scene, surfaces=tuple(replace(s, emission=(0.0, 0.0, 0.0)) for s in scene.surfaces))
+
+
+def _without_sky(scene: Scene) -> Scene:
+    return replace(scene, sky=(0.0, 0.0, 0.0))
+
+
+def _unchanged(scene: Scene) -> Scene:
+    return scene
+
+
+#: Every effect by its name, in the order in which a person reads them.
+EFFECTS: dict[str, Rule] = {
+    "point lamps": Rule(point_lamps, _without_lamps(PointLamp)),
+    "spot lamps": Rule(spot_lamps, _without_lamps(SpotLamp)),
+    "sun": Rule(sun, _without_lamps(SunLamp)),
+    "area lamps": Rule(area_lamps, _without_lamps(AreaLamp)),
+    "soft shadows": Rule(soft_shadows, _with_hard_shadows),
+    "emitting surfaces": Rule(emitting_surfaces, _without_emission),
+    "sky": Rule(sky, _without_sky),
+    "bounces": Rule(bounces, _unchanged),
+}

@@ -1,0 +1,93 @@
+"""Overrides: what a person switches off is gone, what they switch on changes nothing that is not there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.effects import EFFECTS, choose_effects
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp, Surface
+from radiosity_baker.core.settings import Settings
+
+AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
+COLOR = (1.0, 1.0, 1.0)
+QUICK = Settings(triangles=60, error=0.08, threads=1)
+
+
+@pytest.fixture
+def everything(build) -> Scene:
+    """A scene with all effects, each of its lights with a colour of its own."""
+    lamps = (
+        PointLamp("bulb", (0, 0, 1), (1.0, 0, 0), radius=0.1),
+        SpotLamp("torch", (0, 0, 1), (0, 1.0, 0), AXES, 2.0, 0.1, radius=0.1),
+        SunLamp("noon", (0, 0, -1), (0, 0, 1.0), angle=0.1),
+        AreaLamp("softbox", (0, 0, 1), (0.1, 0, 0), (0, 0.1, 0), (0, 0, -1), (9.0, 9.0, 0)),
+    )
+    glow = build.quad("glow", (-1, -1, 2), (0, 0.5, 0), (0.5, 0, 0), surface=1, receives=False)
+    floor = build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    surfaces = (build.grey, Surface("glow", (0, 0, 0), (0, 5.0, 5.0)))
+    return Scene((floor, glow), surfaces, lamps, sky=(0.5, 0, 0.5))
+
+
+def light(scene, **asked):
+    return bake(scene, replace(QUICK, **asked)).objects[0].layers["combined"].astype(float)
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_an_effect_that_is_switched_off_is_off_and_says_by_whom(everything, name):
+    chosen, _ = choose_effects(everything, Settings(effects={name: False}))
+    own = next(effect for effect in chosen if effect.name == name)
+    assert not own.active
+    assert own.reason.startswith("switched off by hand; ")
+
+
+def test_without_all_sources_the_scene_is_dark(everything):
+    sources = [name for name in EFFECTS if name not in ("bounces", "soft shadows")]
+    assert light(everything, effects=dict.fromkeys(sources, False)).max() == 0
+
+
+@pytest.mark.parametrize("name", ["point lamps", "spot lamps", "sun", "area lamps", "emitting surfaces", "sky"])
+def test_the_light_of_all_sources_is_the_sum_of_what_each_gives_alone(everything, name):
+    """A source that is switched off takes its own light away and no other."""
+    sources = ("point lamps", "spot lamps", "sun", "area lamps", "emitting surfaces", "sky")
+    alone = light(everything, effects={other: other == name for other in sources}).mean(axis=(0, 1))
+    rest = light(everything, effects={name: False}).mean(axis=(0, 1))
+    assert alone.max() > 0
+    assert alone + rest == pytest.approx(light(everything).mean(axis=(0, 1)), rel=0.05)
+
+
+def test_without_bounces_only_straight_light_arrives(build):
+    room = build.furnished_room()
+    asked = {"layers": ("combined", "indirect")}
+    straight = bake(room, replace(QUICK, effects={"bounces": False}, **asked))
+    assert all(o.layers["indirect"].max() == 0 for o in straight.objects)
+    assert any(o.layers["combined"].max() > 0 for o in straight.objects)
+    assert straight.report.rays.get("gather", 0) == 0
+
+
+def test_hard_shadows_keep_the_power(everything):
+    _, scene = choose_effects(everything, Settings(effects={"soft shadows": False}))
+    bulb, torch, noon, softbox = scene.lamps
+    assert bulb.radius == torch.radius == noon.angle == 0
+    assert softbox == everything.lamps[3]
+    assert bulb.intensity == everything.lamps[0].intensity
+
+
+def test_an_effect_that_is_called_for_is_not_overridden_by_asking_for_it(everything):
+    plain, _ = choose_effects(everything, Settings())
+    asked, _ = choose_effects(everything, Settings(effects=dict.fromkeys(EFFECTS, True)))
+    assert plain == asked
+
+
+def test_an_effect_that_does_not_exist_is_refused_with_those_that_do(everything):
+    with pytest.raises(SceneError, match=r"no effect 'moon'.*sun.*sky"):
+        choose_effects(everything, Settings(effects={"moon": True}))
+
+
+def test_without_overrides_nothing_changes(everything):
+    _, scene = choose_effects(everything, Settings())
+    assert scene is everything
+    assert np.array_equal(light(everything), light(everything, effects={"sky": True}))
