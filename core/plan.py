@@ -58,7 +58,7 @@ class Effort:
 
 @dataclass(frozen=True)
 class Plan:
-    """scene: with nothing in it but the effects that are simulated; effects with their reasons; how hard to work; and the
+    """scene: with nothing in it but the effects that are simulated; effects with their reasons; how hard to work; the
     cost predicted from a short calibration of this machine."""
 
     scene: Scene
