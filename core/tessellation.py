@@ -69,62 +69,71 @@ def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int
 
     Also returns, for each new triangle, the one it came from.
     """
-    ends = np.sort(np.stack([mesh.triangles, mesh.triangles[:, [1, 2, 0]]], axis=2), axis=2).astype(np.int64)
-    keys = ends[..., 0] * len(mesh.vertices) + ends[..., 1]
-    return _split(mesh, np.isin(keys, keys[chosen]))
+    # Only triangles with two vertices in common with chosen ones can share an edge with them.
+    at_chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    at_chosen[mesh.triangles[chosen]] = True
+    near = np.flatnonzero(np.count_nonzero(at_chosen[mesh.triangles], axis=1) > 1)
+    keys = _edge_keys(mesh.triangles[near], len(mesh.vertices))
+    marked = np.zeros(mesh.triangles.shape, dtype=bool)
+    marked[near] = np.isin(keys, keys[chosen[near]])
+    return _split(mesh, marked)
 
 
 def _split(mesh: Tessellation, marked: Bool) -> tuple[Tessellation, Int64]:
     """Split the marked edges (t, 3): from corner 0 to 1, 1 to 2, 2 to 0. Both sides of an edge must agree."""
-    count = marked.sum(axis=1)
-    midpoint, vertices = _midpoints(mesh, marked)
-    six = np.concatenate([mesh.triangles, midpoint], axis=1)
-    weights = np.concatenate([mesh.barycentric, (mesh.barycentric + mesh.barycentric[:, [1, 2, 0]]) / 2], axis=1)
-    # Turn each triangle so that its split edges come first: ab when one is split, ab and bc when two are.
-    turn = np.where(count == 1, np.argmax(marked, axis=1), 0)
-    turn = np.where(count == 2, (np.argmin(marked, axis=1) + 1) % 3, turn)
-    order = np.array([[0, 1, 2, 3, 4, 5], [1, 2, 0, 4, 5, 3], [2, 0, 1, 5, 3, 4]])[turn]
-    six = np.take_along_axis(six, order, axis=1)
-    weights = np.take_along_axis(weights, order[:, :, None], axis=1)
-
-    triangles, barycentric, sources = [], [], []
-    for template, chosen in _templates(count, vertices, six):
-        triangles.append(six[chosen][:, template].reshape(-1, 3))
-        barycentric.append(weights[chosen][:, template].reshape(-1, 3, 3))
-        sources.append(np.repeat(chosen, len(template)))
+    number = np.count_nonzero(marked, axis=1)
     # Children stand where their parent stood, so neighbours in space stay neighbours in memory.
-    source = np.concatenate(sources)
-    back = np.argsort(source, kind="stable")
-    source = source[back]
-    children = Tessellation(
-        vertices,
-        np.concatenate(triangles)[back].astype(np.int32),
-        mesh.parent[source],
-        np.concatenate(barycentric)[back],
-    )
-    return children, source
+    source = np.repeat(np.arange(len(number)), number + 1)
+    begin = np.cumsum(number + 1) - number - 1
+    triangles, barycentric = mesh.triangles[source], mesh.barycentric[source]
+    parents = np.flatnonzero(number)
+    midpoint, vertices = _midpoints(mesh, parents, marked[parents])
+    six, weights = _turned(mesh, parents, midpoint, marked[parents])
+    for template, chosen in _templates(number[parents], vertices, six):
+        place = begin[parents[chosen], None] + np.arange(len(template))
+        triangles[place] = six[chosen[:, None, None], template]
+        barycentric[place] = weights[chosen[:, None, None], template]
+    return Tessellation(vertices, triangles, mesh.parent[source], barycentric), source
 
 
-def _midpoints(mesh: Tessellation, marked: Bool) -> tuple[Int32, Float64]:
-    """One new vertex for each marked edge, shared by the triangles on both of its sides."""
-    ends = np.stack([mesh.triangles, mesh.triangles[:, [1, 2, 0]]], axis=2)[marked]
-    ends.sort(axis=1)
-    keys = ends[:, 0].astype(np.int64) * len(mesh.vertices) + ends[:, 1]
-    unique, number = np.unique(keys, return_inverse=True)
-    first, second = np.divmod(unique, len(mesh.vertices))
-    midpoint = np.full(mesh.triangles.shape, -1, dtype=np.int32)
-    midpoint[marked] = len(mesh.vertices) + number.reshape(-1)
+def _midpoints(mesh: Tessellation, parents: Int64, marked: Bool) -> tuple[Int32, Float64]:
+    """One new vertex for each marked edge (n, 3) of the parents (n,), shared by the triangles on both of its sides."""
+    count = len(mesh.vertices)
+    unique, number = np.unique(_edge_keys(mesh.triangles[parents], count)[marked], return_inverse=True)
+    first, second = unique // count, unique % count
+    midpoint = np.full(marked.shape, -1, dtype=np.int32)
+    midpoint[marked] = count + number.reshape(-1)
     return midpoint, np.concatenate([mesh.vertices, (mesh.vertices[first] + mesh.vertices[second]) / 2])
 
 
+def _edge_keys(triangles: Int32, vertices: int) -> Int64:
+    """(t, 3) a number for each edge, the same in both triangles that share it."""
+    start, end = triangles.astype(np.int64), triangles[:, [1, 2, 0]]
+    return np.asarray(np.minimum(start, end) * vertices + np.maximum(start, end))
+
+
+def _turned(mesh: Tessellation, parents: Int64, midpoint: Int32, marked: Bool) -> tuple[Int32, Float64]:
+    """Vertices (n, 6) and weights (n, 6, 3) of corners and edge midpoints, turned so that the split edges come first:
+    ab when one is split, ab and bc when two are."""
+    barycentric = mesh.barycentric[parents]
+    six = np.concatenate([mesh.triangles[parents], midpoint], axis=1)
+    weights = np.concatenate([barycentric, (barycentric + barycentric[:, [1, 2, 0]]) / 2], axis=1)
+    number = np.count_nonzero(marked, axis=1)
+    turn = np.where(number == 1, np.argmax(marked, axis=1), 0)
+    turn = np.where(number == 2, (np.argmin(marked, axis=1) + 1) % 3, turn)
+    for number_of_turns, order in ((1, [1, 2, 0, 4, 5, 3]), (2, [2, 0, 1, 5, 3, 4])):
+        chosen = turn == number_of_turns
+        six[chosen], weights[chosen] = six[chosen][:, order], weights[chosen][:, order]
+    return six, weights
+
+
 def _templates(count: np.ndarray, vertices: Float64, six: Int32) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Which triangles take which set of children; a quad is cut along its shorter diagonal."""
+    """Which split triangles take which set of children; a quad is cut along its shorter diagonal."""
     two = np.flatnonzero(count == 2)
     a_to_e = np.linalg.norm(vertices[six[two, 0]] - vertices[six[two, 4]], axis=1)
     d_to_c = np.linalg.norm(vertices[six[two, 3]] - vertices[six[two, 2]], axis=1)
     shorter = a_to_e <= d_to_c
     return [
-        (np.array([[0, 1, 2]]), np.flatnonzero(count == 0)),
         (_TWO, np.flatnonzero(count == 1)),
         (_THREE_AE, two[shorter]),
         (_THREE_DC, two[~shorter]),
