@@ -176,8 +176,8 @@ def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, 
 
 def _touching(receivers: Receivers, chosen: Bool) -> Bool:
     """Cells (c,) that share a vertex with a chosen one."""
-    corner = receivers.corner_vertex[receivers.cells.element]
-    touched = np.zeros(receivers.vertices, dtype=bool)
+    corner = receivers.cell_vertex
+    touched = np.zeros(int(corner.max()) + 1, dtype=bool)
     touched[corner[chosen]] = True
     return np.asarray(touched[corner].any(axis=1))
 
@@ -185,11 +185,12 @@ def _touching(receivers: Receivers, chosen: Bool) -> Bool:
 def _on_borders(receivers: Receivers, probe: _Probe, fair: float) -> Int64:
     """Cells (n,) that share a vertex with hidden and open cells, or with cells that see other lights or see them in
     part, if light differs among them by enough to matter."""
-    corner = receivers.corner_vertex[receivers.cells.element]
+    corner = receivers.cell_vertex
+    vertices = int(corner.max()) + 1
 
     def extremes(values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
         """Smallest and largest value (c,) among the cells around each vertex."""
-        low, high = np.full((2, receivers.vertices), values[0])
+        low, high = np.full((2, vertices), values[0])
         for k in range(3):
             low[corner[:, k]] = high[corner[:, k]] = values
         for k in range(3):

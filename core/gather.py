@@ -23,7 +23,9 @@ class Points:
         self.weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
         self.positions = np.einsum("nc,nck->nk", self.weights, cells.corners[chosen])
         self.normals = cells.normals[chosen]
-        self.barycentric = np.einsum("nc,nck->nk", self.weights, cells.barycentric[chosen])
+        self.barycentric = self.weights
+        if cells.barycentric is not None:
+            self.barycentric = np.einsum("nc,nck->nk", self.weights, cells.barycentric[chosen])
         self.shading = self.normals
         if cells.shading is not None:
             blended = np.einsum("nc,nck->nk", self.weights, cells.shading[chosen])

@@ -33,8 +33,8 @@ class Cells:
     """Where light is sampled on the receivers: c small triangles, each inside one triangle of the output.
 
     corners (c, 3, 3), normals (c, 3), area (c,) in the unit box; shading (c, 3, 3) normals at the corners or None when
-    all is flat; element (c,) the output triangle; barycentric (c, 3, 3) the cell's corners in the output triangle;
-    surface (c,) into Scene.surfaces.
+    all is flat; element (c,) the output triangle; barycentric (c, 3, 3) the cell's corners in the output triangle, or
+    None when each is one; surface (c,) into Scene.surfaces.
     """
 
     corners: Float64
@@ -42,7 +42,7 @@ class Cells:
     area: Float64
     shading: Float64 | None
     element: Int32
-    barycentric: Float64
+    barycentric: Float64 | None
     surface: Int32
 
     def __len__(self) -> int:
@@ -76,8 +76,7 @@ class Patches:
     def as_cells(self) -> Cells:
         """The triangles, to sample light on as on a receiver."""
         every = np.arange(len(self.area), dtype=np.int32)
-        corners = np.broadcast_to(np.eye(3), self.corners.shape)
-        return Cells(self.corners, self.normals, self.area, None, every, corners, every)
+        return Cells(self.corners, self.normals, self.area, None, every, None, every)
 
 
 def unit_space(scene: Scene) -> Space:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -21,8 +22,7 @@ class Receivers:
     output meshes unless the input's own triangles are kept.
 
     first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
-    the unit box, element_surface (e,) into Scene.surfaces, corner_vertex (e, 3) the fit vertex of each of their
-    corners; vertices: how many fit vertices there are.
+    the unit box, element_shading (e, 3, 3) their corners' normals, element_surface (e,) into Scene.surfaces.
     """
 
     space: Space
@@ -32,9 +32,28 @@ class Receivers:
     cells: Cells
     first: Int32
     element_corners: Float64
+    element_shading: Float64
     element_surface: Int32
-    corner_vertex: Int32
-    vertices: int
+
+    @property
+    def corner_vertex(self) -> Int32:
+        """(e, 3) the fit vertex of each corner of the output triangles."""
+        return self._fit_vertices[0]
+
+    @property
+    def vertices(self) -> int:
+        """How many fit vertices there are."""
+        return self._fit_vertices[1]
+
+    @cached_property
+    def _fit_vertices(self) -> tuple[Int32, int]:
+        # Only when someone asks: while triangles are still being split, nobody does.
+        return fit_vertices(_numbered(self.meshes), self.element_shading, self.element_surface)
+
+    @cached_property
+    def cell_vertex(self) -> Int32:
+        """(c, 3) the mesh vertex of each corner of the cells, counted over all receivers."""
+        return _numbered(self.fine)
 
 
 def make_receivers(scene: Scene, space: Space, settings: Settings, triangles: int) -> Receivers:
@@ -52,48 +71,47 @@ def lay_out(objects: tuple[SceneObject, ...], fine: list[Tessellation], space: S
     """Cells on the triangles of the fine meshes, which become the output as well if `tessellate`."""
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]
     first = np.concatenate([[0], np.cumsum([len(m.triangles) for m in meshes])]).astype(np.int32)
-
-    corners, normals, area, shading, element, barycentric, surface = [], [], [], [], [], [], []
-    for number, (receiver, mesh) in enumerate(zip(objects, fine, strict=True)):
-        corners.append(space.normalise(mesh.vertices[mesh.triangles]))
-        n, a = triangle_geometry(corners[-1])
-        normals.append(n)
-        area.append(a)
-        shading.append(shading_normals(receiver, mesh.parent, mesh.barycentric, n))
-        inside = np.arange(len(a)) if tessellate else mesh.parent
-        element.append(first[number] + inside)
-        weights = np.broadcast_to(np.eye(3), mesh.barycentric.shape) if tessellate else mesh.barycentric
-        barycentric.append(weights)
-        surface.append(receiver.surface[mesh.parent])
+    corners, normals, area, shading, surface = _faces(objects, fine, space)
+    element, barycentric = np.arange(len(area), dtype=np.int32), None
+    element_corners, element_shading, element_surface = corners, shading, surface
+    if not tessellate:
+        element = np.concatenate([begin + m.parent for begin, m in zip(first, fine, strict=False)]).astype(np.int32)
+        barycentric = np.concatenate([m.barycentric for m in fine])
+        element_corners, _, _, element_shading, element_surface = _faces(objects, meshes, space)
     flat = all(o.corner_normals is None for o in objects)
-    cells = Cells(
-        corners=np.concatenate(corners),
-        normals=np.concatenate(normals),
-        area=np.concatenate(area),
-        shading=None if flat else np.concatenate(shading),
-        element=np.concatenate(element).astype(np.int32),
-        barycentric=np.concatenate(barycentric),
-        surface=np.concatenate(surface).astype(np.int32),
-    )
-    element_corners = [space.normalise(m.vertices[m.triangles]) for m in meshes]
-    corner_vertex, count = [], 0
-    for receiver, mesh, own in zip(objects, meshes, element_corners, strict=True):
-        normal = shading_normals(receiver, mesh.parent, mesh.barycentric, triangle_geometry(own)[0])
-        vertex, used = fit_vertices(mesh.triangles, normal, receiver.surface[mesh.parent])
-        corner_vertex.append(vertex + count)
-        count += used
     return Receivers(
         space=space,
         objects=objects,
         meshes=tuple(meshes),
         fine=tuple(fine),
-        cells=cells,
+        cells=Cells(corners, normals, area, None if flat else shading, element, barycentric, surface),
         first=first,
-        element_corners=np.concatenate(element_corners),
-        element_surface=np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)]),
-        corner_vertex=np.concatenate(corner_vertex).astype(np.int32),
-        vertices=count,
+        element_corners=element_corners,
+        element_shading=element_shading,
+        element_surface=element_surface,
     )
+
+
+def _faces(
+    objects: tuple[SceneObject, ...], meshes: list[Tessellation], space: Space
+) -> tuple[Float64, Float64, Float64, Float64, Int32]:
+    """Of the triangles of all meshes: corners (t, 3, 3) in the unit box, normals (t, 3), areas (t,), shading normals
+    (t, 3, 3) and surfaces (t,)."""
+    corners = np.concatenate([space.normalise(m.vertices)[m.triangles] for m in meshes])
+    normals, area = triangle_geometry(corners)
+    ends = np.cumsum([len(m.triangles) for m in meshes])[:-1]
+    shading = [
+        shading_normals(o, m.parent, m.barycentric, n)
+        for o, m, n in zip(objects, meshes, np.split(normals, ends), strict=True)
+    ]
+    surface = np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)])
+    return corners, normals, area, np.concatenate(shading), surface.astype(np.int32)
+
+
+def _numbered(meshes: tuple[Tessellation, ...]) -> Int32:
+    """(t, 3) vertices of the triangles of all meshes, counted through."""
+    begin = np.concatenate([[0], np.cumsum([len(m.vertices) for m in meshes])[:-1]])
+    return np.concatenate([m.triangles + b for m, b in zip(meshes, begin, strict=True)]).astype(np.int32)
 
 
 def split_cells(receivers: Receivers, chosen: Bool) -> tuple[Receivers, Int64]:

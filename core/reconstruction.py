@@ -139,7 +139,9 @@ class Fit:
         self._receivers = receivers
         self._count = receivers.vertices
         self._corner = receivers.corner_vertex[receivers.cells.element]
-        sampled = (count > 0)[:, None] & (receivers.cells.barycentric.max(axis=1) > 0)
+        sampled = np.repeat((count > 0)[:, None], 3, axis=1)
+        if receivers.cells.barycentric is not None:
+            sampled &= receivers.cells.barycentric.max(axis=1) > 0
         self.measured = self._scatter(sampled) > 0
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
         vertex, jump, weight = gradient_jumps(receivers, self.measured)

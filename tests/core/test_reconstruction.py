@@ -52,7 +52,7 @@ def sample(receivers, function, passes=6, valid=None, seed=0) -> Samples:
         weights = triangle_points(rng.random((len(cells), 2)))
         values = function(np.einsum("nc,nck->nk", weights, cells.corners))
         samples = samples or Samples(len(cells), values.shape[1])
-        inside = np.einsum("nc,nck->nk", weights, cells.barycentric)
+        inside = weights if cells.barycentric is None else np.einsum("nc,nck->nk", weights, cells.barycentric)
         samples.add(slice(None), inside, values, np.zeros_like(values), valid)
     return samples
 
