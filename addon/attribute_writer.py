@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from time import perf_counter
 from typing import Literal
 
 import bpy
@@ -11,15 +13,18 @@ import numpy as np
 
 from ..core.result import BakedObject, BakeResult
 from ..core.scene import Float32, SceneError
+from .copies import put_copies, remove_copies, replace_mesh
 from .render_visibility import shown_as_rendered
-from .scene_reader import ORIGINAL_KEY, ReceiverSource, check_same_corners, evaluated_mesh
-from .tessellated_mesh import build_mesh
+from .scene_reader import ReceiverSource, check_same_corners, evaluated_mesh
+from .slices import Steps, at_once, breathe
+from .tessellated_mesh import MeshData, build_mesh
 
 ResultMode = Literal["new", "replace", "keep"]
 
 #: Custom property of a mesh: which of its colour attributes this add-on wrote, name to layer.
 OURS_KEY = "radiosity_baker"
-COPIES_COLLECTION = "Radiosity Bake"
+#: How long the originals are read before Blender may draw.
+_READING_SECONDS = 0.02
 
 
 def attribute_name(attribute: str, layer: str) -> str:
@@ -58,28 +63,51 @@ def write(
     result_mode: ResultMode,
     attribute: str = "Radiosity",
 ) -> list[bpy.types.Object]:
-    """Write the light and return the objects that carry it. Fills result.report.objects in.
+    """Write the light and return the objects that carry it: all steps of `writing` at once."""
+    return at_once(writing(context.view_layer, result, sources, result_mode=result_mode, attribute=attribute))
+
+
+def writing(
+    view_layer: bpy.types.ViewLayer,
+    result: BakeResult,
+    sources: Sequence[ReceiverSource],
+    *,
+    result_mode: ResultMode,
+    attribute: str = "Radiosity",
+) -> Steps[list[bpy.types.Object]]:
+    """Steps that write the light, to the objects that carry it. Fills result.report.objects in.
 
     keep: the corners of the object's own mesh. replace: the object gets a tessellated mesh of its own; the old mesh
     stays with its other users. new: a tessellated copy with modifiers applied, in the collection "Radiosity Bake"; the
     original is untouched, but hidden from viewport and render since the copy lies exactly on it. A copy is renewed when
-    its original is baked again, and baking the copy itself renews its light.
-    Raises SceneError before anything is changed.
+    its original is baked again, and goes when the light is written to the original itself.
+    Objects and their meshes change in the last step only: stopped before it, or raising SceneError, nothing has.
     """
-    context.view_layer.update()  # Until then a removed object leaves a hole in its list.
-    objects = [_find(context.view_layer, source) for source in sources]
+    view_layer.update()  # Until then a removed object leaves a hole in its list.
+    objects = _find(view_layer, sources)
     baked = {item.name: item for item in result.objects}
     layers = list(result.objects[0].layers) if result.objects else []
     check_writable(objects, layers, result_mode=result_mode, attribute=attribute)
     receivers = [_Receiver(obj, source, baked[source.name]) for obj, source in zip(objects, sources, strict=True)]
-
     if result_mode == "keep":
-        values = [_kept_corners(receiver) for receiver in receivers]
+        values = []
+        for receiver in receivers:
+            _check_unchanged(receiver.object, receiver.object.data, receiver.source)
+            values.append((yield partial(_kept_corners, receiver, len(receiver.object.data.loops))))
         for receiver, layers_of in zip(receivers, values, strict=True):
             _paint(receiver.object.data, layers_of, attribute)
+        remove_copies(view_layer, objects)
         written = objects
     else:
-        written = _write_tessellated(context, receivers, result_mode=result_mode, attribute=attribute)
+        meshes: list[bpy.types.Mesh] = []
+        try:
+            yield from _tessellate(view_layer, receivers, meshes, result_mode=result_mode, attribute=attribute)
+        except BaseException:
+            bpy.data.batch_remove(meshes)
+            raise
+        put = _put_meshes if result_mode == "replace" else put_copies
+        written = put(view_layer, objects, meshes)
+        view_layer.update()
     result.report.objects[:] = [_entry(obj, attribute) for obj in written]
     return written
 
@@ -91,54 +119,60 @@ class _Receiver:
     baked: BakedObject
 
 
-def _write_tessellated(
-    context: bpy.types.Context, receivers: Sequence[_Receiver], *, result_mode: ResultMode, attribute: str
-) -> list[bpy.types.Object]:
-    meshes: list[bpy.types.Mesh] = []
-    try:
-        with shown_as_rendered(context.view_layer):
-            depsgraph = context.evaluated_depsgraph_get()
-            # One by one, so that the list holds what was made should the next one fail.
-            meshes.extend(
-                _tessellated(receiver, depsgraph, result_mode=result_mode, attribute=attribute)
-                for receiver in receivers
-            )
-    except BaseException:
-        bpy.data.batch_remove(meshes)
-        raise
-    put = _replace_mesh if result_mode == "replace" else _put_copy
-    written = [put(context, receiver.object, mesh) for receiver, mesh in zip(receivers, meshes, strict=True)]
-    context.view_layer.update()
-    return written
+def _tessellate(
+    view_layer: bpy.types.ViewLayer,
+    receivers: Sequence[_Receiver],
+    meshes: list[bpy.types.Mesh],
+    *,
+    result_mode: ResultMode,
+    attribute: str,
+) -> Steps[None]:
+    """Fill `meshes` with a new one for each receiver, which no object uses yet."""
+    originals: list[MeshData] = []
+    while len(originals) < len(receivers):
+        originals += _read_some(view_layer, receivers[len(originals) :], result_mode, attribute)
+        yield breathe
+    for receiver, original in zip(receivers, originals, strict=True):
+        mesh = yield from build_mesh(original, receiver.source, receiver.baked)
+        meshes.append(mesh)
+        turn = [0, 2, 1] if receiver.source.flipped else [0, 1, 2]
+        painted = {name: values[:, turn].reshape(-1, 3) for name, values in receiver.baked.layers.items()}
+        _paint(mesh, painted, attribute)
+        yield breathe
 
 
-def _tessellated(
-    receiver: _Receiver, depsgraph: bpy.types.Depsgraph, *, result_mode: ResultMode, attribute: str
-) -> bpy.types.Mesh:
-    obj, source, baked = receiver.object, receiver.source, receiver.baked
-    names = {attribute_name(attribute, layer) for layer in baked.layers}
-    with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
-        if result_mode == "replace":
-            check_same_corners(obj, evaluated)
-        # The modifiers of a replaced mesh stay, and would act twice on what they have made already.
-        shape = obj.data if result_mode == "replace" else evaluated
-        _check_unchanged(obj, shape, source)
-        mesh = build_mesh(shape, obj.vertex_groups, source, baked, leave_out=names)
-    turn = [0, 2, 1] if source.flipped else [0, 1, 2]
-    _paint(mesh, {name: values[:, turn].reshape(-1, 3) for name, values in baked.layers.items()}, attribute)
-    return mesh
+def _read_some(
+    view_layer: bpy.types.ViewLayer, receivers: Sequence[_Receiver], result_mode: ResultMode, attribute: str
+) -> list[MeshData]:
+    """The meshes of the first receivers, as many as a moment is enough for."""
+    read: list[MeshData] = []
+    with shown_as_rendered(view_layer):
+        view_layer.update()
+        depsgraph = view_layer.depsgraph
+        end = perf_counter() + _READING_SECONDS
+        for receiver in receivers:
+            obj, source = receiver.object, receiver.source
+            names = {attribute_name(attribute, layer) for layer in receiver.baked.layers}
+            with evaluated_mesh(obj.evaluated_get(depsgraph)) as evaluated:
+                if result_mode == "replace":
+                    check_same_corners(obj, evaluated)
+                # The modifiers of a replaced mesh stay, and would act twice on what they have made already.
+                shape = obj.data if result_mode == "replace" else evaluated
+                _check_unchanged(obj, shape, source)
+                read.append(MeshData.read(shape, obj.vertex_groups, leave_out=names))
+            if perf_counter() > end:
+                break
+    return read
 
 
-def _kept_corners(receiver: _Receiver) -> dict[str, Float32]:
-    """Values (corners, 3) per layer for a mesh as it is: the mean of the triangles that meet in a face's corner."""
-    mesh, source = receiver.object.data, receiver.source
-    _check_unchanged(receiver.object, mesh, source)
-    corners = source.corners.ravel()
-    triangles = np.bincount(corners, minlength=len(mesh.loops))
+def _kept_corners(receiver: _Receiver, count: int) -> dict[str, Float32]:
+    """Values (count, 3) per layer for a mesh as it is: the mean of the triangles that meet in a face's corner."""
+    corners = receiver.source.corners.ravel()
+    triangles = np.bincount(corners, minlength=count)
     layers = {}
     for name, values in receiver.baked.layers.items():
         flat = values.reshape(-1, 3).astype(np.float64)
-        sums = np.stack([np.bincount(corners, flat[:, c], minlength=len(mesh.loops)) for c in range(3)], axis=1)
+        sums = np.stack([np.bincount(corners, flat[:, c], minlength=count) for c in range(3)], axis=1)
         # Faces with no area to triangulate take the object's mean rather than black.
         mean = np.broadcast_to(flat.mean(axis=0), sums.shape)
         shares = np.maximum(triangles, 1)[:, None]
@@ -147,7 +181,10 @@ def _kept_corners(receiver: _Receiver) -> dict[str, Float32]:
 
 
 def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> None:
-    """Write (corners, 3) values of each layer into colour attributes of their own, the combined one active."""
+    """Write (corners, 3) values of each layer into colour attributes of their own, the combined one active.
+
+    Layers that an earlier bake has left and this one has not are taken away: their light is out of date.
+    """
     ours = dict(mesh.get(OURS_KEY) or {})
     for layer, values in layers.items():
         name = attribute_name(attribute, layer)
@@ -161,6 +198,11 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
         rgba[:, :3] = values
         target.data.foreach_set("color", rgba.ravel())
         ours[name] = layer
+    for stale, layer in list(ours.items()):
+        if stale == attribute_name(attribute, layer) and layer not in layers:
+            del ours[stale]
+            if stale in mesh.color_attributes:
+                mesh.color_attributes.remove(mesh.color_attributes[stale])
     mesh[OURS_KEY] = ours
     shown = attribute if "combined" in layers else attribute_name(attribute, next(iter(layers)))
     mesh.color_attributes.active_color_name = shown
@@ -168,58 +210,13 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
     mesh.update()
 
 
-def _replace_mesh(_: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    old = obj.data
-    name = old.name
-    obj.data = mesh
-    if old.users == 0:
-        bpy.data.meshes.remove(old)
-        mesh.name = name
-    return obj
-
-
-def _put_copy(context: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    if obj.get(ORIGINAL_KEY) is not None:
-        return _replace_mesh(context, obj, mesh)
-    copy = next((other for other in context.view_layer.objects if other.get(ORIGINAL_KEY) == obj), None)
-    if copy is None:
-        copy = _new_copy(context, obj, mesh)
-    else:
-        copy.matrix_world = obj.matrix_world
-        _replace_mesh(context, copy, mesh)
-    _show_instead(context.view_layer, obj, copy)
-    return copy
-
-
-def _new_copy(context: bpy.types.Context, obj: bpy.types.Object, mesh: bpy.types.Mesh) -> bpy.types.Object:
-    copy = obj.copy()
-    copy.name = mesh.name = f"{obj.name} Radiosity"
-    copy.modifiers.clear()
-    copy.instance_type = "NONE"
-    copy[ORIGINAL_KEY] = obj
-    copy.data = mesh
-    children = context.scene.collection.children
-    collection = next((child for child in children if child.name.startswith(COPIES_COLLECTION)), None)
-    if collection is None:
-        collection = bpy.data.collections.new(COPIES_COLLECTION)
-        children.link(collection)
-    collection.objects.link(copy)
-    return copy
-
-
-def _show_instead(view_layer: bpy.types.ViewLayer, obj: bpy.types.Object, copy: bpy.types.Object) -> None:
-    """The copy takes the original's place in the view, and its part in what is selected and active."""
-    was_active, was_selected = view_layer.objects.active == obj, obj.select_get(view_layer=view_layer)
-    obj.select_set(False, view_layer=view_layer)
-    obj.hide_set(True, view_layer=view_layer)
-    obj.hide_render = True
-    copy.hide_render = False
-    view_layer.update()
-    copy.hide_set(False, view_layer=view_layer)
-    if was_selected:
-        copy.select_set(True, view_layer=view_layer)
-    if was_active:
-        view_layer.objects.active = copy
+def _put_meshes(
+    view_layer: bpy.types.ViewLayer, objects: Sequence[bpy.types.Object], meshes: Sequence[bpy.types.Mesh]
+) -> list[bpy.types.Object]:
+    for obj, mesh in zip(objects, meshes, strict=True):
+        replace_mesh(obj, mesh)
+    remove_copies(view_layer, objects)
+    return list(objects)
 
 
 def _entry(obj: bpy.types.Object, attribute: str) -> dict[str, str | int]:
@@ -234,11 +231,12 @@ def _entry(obj: bpy.types.Object, attribute: str) -> dict[str, str | int]:
     }
 
 
-def _find(view_layer: bpy.types.ViewLayer, source: ReceiverSource) -> bpy.types.Object:
-    found = next((obj for obj in view_layer.objects if obj.session_uid == source.session_uid), None)
-    if found is None:
-        raise SceneError(f"Object '{source.name}' was removed during the bake: put it back and bake again.")
-    return found
+def _find(view_layer: bpy.types.ViewLayer, sources: Sequence[ReceiverSource]) -> list[bpy.types.Object]:
+    objects = {obj.session_uid: obj for obj in view_layer.objects}
+    for source in sources:
+        if source.session_uid not in objects:
+            raise SceneError(f"Object '{source.name}' was removed during the bake: put it back and bake again.")
+    return [objects[source.session_uid] for source in sources]
 
 
 def _check_unchanged(obj: bpy.types.Object, mesh: bpy.types.Mesh, source: ReceiverSource) -> None:

@@ -11,12 +11,18 @@ from contextlib import contextmanager
 
 import bpy
 
+from .copies import original_of
+
 
 def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[bpy.types.Object]:
-    """Objects of a view layer that a render shows: not hidden from it themselves, nor through all their collections."""
-    return {
+    """Objects of a view layer that a render shows: not hidden from it themselves, nor through all their collections.
+
+    Where a baked copy shows, or its original, it is the original that counts.
+    """
+    shown = {
         obj for layer in _rendered_layers(view_layer.layer_collection) for obj in _shown(layer) if not obj.hide_render
     }
+    return {original_of(view_layer, obj) for obj in shown}
 
 
 @contextmanager

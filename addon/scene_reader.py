@@ -10,12 +10,10 @@ import bpy
 import numpy as np
 
 from ..core.scene import Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, Surface
+from .copies import copies_of, original_of, place_of
 from .lamps import read_lamp
 from .materials import DEFAULT_SURFACE, read_material, read_world
 from .render_visibility import rendered_objects, shown_as_rendered
-
-#: Custom property of a baked copy (result `new`): the object it was made from.
-ORIGINAL_KEY = "radiosity_baker_original"
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +48,13 @@ def pick_receivers(
     else:
         picked = [obj for obj in view_layer.objects if obj.type == "MESH" and obj.select_get(view_layer=view_layer)]
     if not picked:
-        covered = _covered(rendered, picked)
-        picked = [obj for obj in view_layer.objects if obj.type == "MESH" and obj in rendered and obj not in covered]
+        picked = [obj for obj in view_layer.objects if obj.type == "MESH" and obj in rendered]
     if not picked:
         raise SceneError(
             f"Scene '{scene.name}' has no mesh object that is visible to rendering: add one, or switch its camera icon "
             "on in the Outliner."
         )
+    picked = list(dict.fromkeys(original_of(view_layer, obj) for obj in picked))
     for obj in picked:
         _check_rendered(obj, rendered)
     return picked
@@ -75,7 +73,7 @@ def read_scene(
     rendered = rendered_objects(view_layer)
     for obj in receivers:
         _check_rendered(obj, rendered)
-    reading = _Reading(set(receivers), rendered - _covered(rendered, receivers))
+    reading = _Reading(set(receivers), rendered, copies_of(view_layer))
     with shown_as_rendered(view_layer):
         depsgraph.update()
         for instance in depsgraph.object_instances:
@@ -123,9 +121,15 @@ def check_same_corners(obj: bpy.types.Object, evaluated: bpy.types.Mesh) -> None
 class _Reading:
     """What has been read so far. Each mesh is converted once, however many instances show it."""
 
-    def __init__(self, receivers: set[bpy.types.Object], rendered: set[bpy.types.Object]) -> None:
+    def __init__(
+        self,
+        receivers: set[bpy.types.Object],
+        rendered: set[bpy.types.Object],
+        copies: dict[bpy.types.Object, bpy.types.Object],
+    ) -> None:
         self.receivers = receivers
         self.rendered = rendered
+        self.copies = copies
         self.objects: list[SceneObject] = []
         self.sources: list[ReceiverSource] = []
         self.lamps: list[Lamp] = []
@@ -137,7 +141,7 @@ class _Reading:
         # Curves, texts, surfaces and metaballs come a second time, as the mesh that they evaluate to.
         obj = instance.object
         if obj.type in {"MESH", "LIGHT"} and _renders(instance, self.rendered):
-            matrix = np.array(instance.matrix_world, dtype=np.float64)
+            matrix = self._place(instance)
             name = f"{instance.parent.name}/{obj.name}" if instance.is_instance else obj.name_full
             if obj.type == "MESH":
                 self._add_mesh(instance, name, matrix)
@@ -145,6 +149,12 @@ class _Reading:
                 lamp, warnings = read_lamp(name, obj.data, matrix)
                 self.warnings += warnings
                 self.lamps += [lamp] if lamp is not None else []
+
+    def _place(self, instance: bpy.types.DepsgraphObjectInstance) -> Float64:
+        copy = None if instance.is_instance else self.copies.get(instance.object.original)
+        if copy is not None:
+            return place_of(instance.object, copy)
+        return np.array(instance.matrix_world, dtype=np.float64)
 
     def _add_mesh(self, instance: bpy.types.DepsgraphObjectInstance, name: str, matrix: Float64) -> None:
         obj = instance.object
@@ -274,16 +284,6 @@ def _renders(instance: bpy.types.DepsgraphObjectInstance, rendered: set[bpy.type
     # Collections leave out what is hidden; geometry nodes show what they are told to.
     hidden = instance.parent.instance_type != "NONE" and original.hide_render
     return instance.parent.original in rendered and not hidden
-
-
-def _covered(rendered: set[bpy.types.Object], receivers: Sequence[bpy.types.Object]) -> set[bpy.types.Object]:
-    """Where a baked copy and its original both show, one of the two lies within the other: the one to leave out."""
-    covered = set()
-    for copy in rendered:
-        original = copy.get(ORIGINAL_KEY)
-        if original in rendered:
-            covered.add(original if copy in receivers and original not in receivers else copy)
-    return covered
 
 
 def _world_normals(normals: Float32 | None, linear: Float64, turn: list[int]) -> Float32 | None:

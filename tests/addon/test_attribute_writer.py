@@ -4,8 +4,9 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_baker.addon.attribute_writer import COPIES_COLLECTION, OURS_KEY, check_writable, write
-from radiosity_baker.addon.scene_reader import ORIGINAL_KEY, read_scene
+from radiosity_baker.addon.attribute_writer import OURS_KEY, check_writable, write, writing
+from radiosity_baker.addon.copies import COPIES_COLLECTION, ORIGINAL_KEY, remove_copies
+from radiosity_baker.addon.scene_reader import read_scene
 from radiosity_baker.core.scene import SceneError
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -263,14 +264,71 @@ def test_baking_the_original_again_renews_its_copy(cube, bake):
     assert len([mesh for mesh in bpy.data.meshes if mesh.name.startswith("Cube")]) == 2
 
 
-def test_baking_a_copy_again_makes_no_copy_of_the_copy(cube, bake):
+def test_baking_again_after_the_copy_was_moved_takes_the_original_there(cube, bake):
+    (copy,) = bake(cube, mode="new", levels=0)
+    copy.location.z = 5.0
+    bpy.context.view_layer.update()
+
+    bake(cube, mode="new", levels=0)
+
+    assert cube.matrix_world.translation.z == pytest.approx(5.0)
+    np.testing.assert_allclose(copy.matrix_world, cube.matrix_world, atol=1e-6)
+
+
+def test_a_copy_goes_when_the_light_is_written_to_its_original(cube, bake):
+    bake(cube, mode="new", levels=0)
+
+    bake(cube, mode="keep", levels=0)
+
+    assert [obj.name for obj in bpy.data.objects if obj.type == "MESH"] == ["Cube"]
+    assert [mesh.name for mesh in bpy.data.meshes] == ["Cube"]
+    assert not cube.hide_render
+    assert not cube.hide_get()
+    assert COPIES_COLLECTION not in bpy.data.collections
+
+
+def test_an_object_that_was_hidden_in_the_viewport_is_so_again_when_its_copy_goes(cube, bake):
+    cube.hide_set(True)
+    bake(cube, mode="new", levels=0)
+
+    remove_copies(bpy.context.view_layer, [cube])
+
+    assert cube.hide_get()
+    assert not cube.hide_render
+
+
+def test_a_copy_that_outlives_its_original_is_renewed(cube, bake):
     (first,) = bake(cube, mode="new", levels=1)
+    bpy.data.objects.remove(cube)
 
     (second,) = bake(first, mode="new", levels=0)
 
     assert second == first
     assert len(second.data.polygons) == 48
     assert not second.hide_get()
+
+
+@pytest.mark.parametrize("mode", ["keep", "replace", "new"])
+def test_layers_of_an_earlier_bake_go(cube, bake, mode):
+    bake(cube, mode=mode, levels=0, layers=("combined", "direct"))
+
+    (written,) = bake(cube, mode=mode, levels=0, layers=("combined",))
+
+    assert written.data.color_attributes.keys() == ["Radiosity"]
+
+
+def test_stopped_while_it_writes_it_leaves_no_mesh_behind(cube, bake_positions):
+    scene, sources = read_scene(bpy.context.evaluated_depsgraph_get(), [cube], tessellate=True)
+    result = bake_positions(scene, 1)
+    before = (snapshot(cube), bpy.data.meshes.keys(), bpy.data.objects.keys())
+    steps = writing(bpy.context.view_layer, result, sources, result_mode="new")
+    answer = None
+    while len(bpy.data.meshes) == len(before[1]):
+        answer = steps.send(answer)()
+
+    steps.close()
+
+    assert (snapshot(cube), bpy.data.meshes.keys(), bpy.data.objects.keys()) == before
 
 
 def test_new_in_edit_mode_takes_what_is_being_edited(cube, bake):

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from radiosity_baker.addon.scene_reader import ORIGINAL_KEY, pick_receivers, read_scene
+from radiosity_baker.addon.copies import ORIGINAL_KEY, PLACE_KEY
+from radiosity_baker.addon.scene_reader import pick_receivers, read_scene
 from radiosity_baker.core.scene import SceneError
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -289,17 +290,35 @@ def test_modifiers_that_only_move_vertices_keep_their_corners(add_mesh):
     np.testing.assert_allclose(scene.objects[0].vertices[:, 2], 2.0)
 
 
-def test_a_baked_copy_and_its_original_are_not_both_in_the_way(add_mesh):
+def test_the_original_is_baked_whichever_of_it_and_its_copy_shows(add_mesh):
     original, copy = add_mesh("Wall"), add_mesh("Wall Radiosity")
     copy[ORIGINAL_KEY] = original
 
     assert pick() == [original]
+    original.hide_render = True
+    original.hide_set(True)
+    copy.select_set(True)
+    assert pick() == [original]
+    assert pick(["Wall Radiosity"]) == [original]
     assert names(read(original)[0]) == ["Wall"]
-    assert names(read(copy)[0]) == ["Wall Radiosity"]
+
     collection("Put away", original)
     bpy.context.view_layer.layer_collection.children["Put away"].exclude = True
     assert pick() == [copy]
     assert names(read(copy)[0]) == ["Wall Radiosity"]
+
+
+def test_the_original_is_read_where_its_copy_was_moved_to(add_mesh):
+    original, copy = add_mesh("Wall"), add_mesh("Wall Radiosity")
+    copy[ORIGINAL_KEY] = original
+    copy[PLACE_KEY] = np.ravel(copy.matrix_world).tolist()
+
+    original.location.y = 2.0
+    bpy.context.view_layer.update()
+    assert read(original)[0].objects[0].vertices[:, 1].min() == 2.0
+    copy.location.x = 3.0
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(read(original)[0].objects[0].vertices.min(axis=0), [3.0, 0.0, 0.0])
 
 
 def test_receivers_are_the_named_else_the_selected_else_all(add_mesh):
