@@ -20,11 +20,12 @@ from .scene import Float64
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fit: alpha; vertex values (v, k) of all samples together; squared error of each cell (c,) by sampling and by
-    resolution, of grey irradiance."""
+    """A fit: alpha; vertex values (v, k) of all samples together, and their mean light (v,); squared error of each cell
+    (c,) by sampling and by resolution, of the mean light."""
 
     alpha: float
     values: Float64
+    grey: Float64
     sampling: Float64
     resolution: Float64
 
@@ -52,29 +53,29 @@ ALPHAS = (0.02, 0.5, 5.0)
 
 def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:
     """Fit with the alpha at which each half of the samples best predicts the other (cross-validation), judged by the
-    last channel, the mean of all light. area (c,) of the cells."""
-    grey = [half.channel(-1) for half in halves]
+    mean light. area (c,) of the cells."""
+    grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
     lowest, alpha = np.inf, ALPHAS[0]
     residual = spread = np.zeros(len(area))
     values: list[Float64 | None] = [None, None]
     for candidate in ALPHAS:
         values = [fit.solve(system, candidate, start) for system, start in zip(systems, values, strict=True)]
-        first, second = (fit.at_corners(v) for v in values if v is not None)
-        predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first))[:, 0] / 2
+        first, second = (fit.at_corners(v)[..., 0] for v in values if v is not None)
+        predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
         score = float(area @ predicted)
         if score > lowest:
             break
-        lowest, alpha, residual, spread = score, candidate, predicted, squared_mean(first - second)[:, 0]
+        lowest, alpha, residual, spread = score, candidate, predicted, squared_mean(first - second)
     count = np.maximum(grey[0].count + grey[1].count, 1.0)
-    own_noise = (grey[0].noise + grey[1].noise)[:, 0] / count
+    own_noise = (grey[0].noise + grey[1].noise) / count
     merged = fit.system(halves[0] + halves[1])
     together = fit.fill(np.maximum(fit.solve(merged, alpha), 0.0))
-    return Fitted(alpha, together, spread / 4.0, residual - own_noise - spread / 2.0)
+    return Fitted(alpha, together, together @ halves[0].to_grey, spread / 4.0, residual - own_noise - spread / 2.0)
 
 
 def squared_mean(corners: Float64) -> Float64:
-    """Mean over each triangle of the square of linear functions with corner values (c, 3, k): (c, k)."""
+    """Mean (c,) over each triangle of the square of linear functions with corner values (c, 3)."""
     return np.asarray((corners.sum(axis=1) ** 2 + (corners**2).sum(axis=1)) / 12.0)
 
 

@@ -35,10 +35,10 @@ class Points:
 def gather_indirect(
     points: Points, hemispheres: Hemispheres, tables: Float32, seed: int, number: int, workers: Workers
 ) -> tuple[Float64, Float64, Bool]:
-    """Irradiance (n, k) at the points from tables (codes, k) of radiosity, its variance (n, k), and the points (n,)
+    """Irradiance (n, k) at the points from tables (codes, k) of radiosity, its deviation (n, k), and the points (n,)
     from which nearly every ray meets the back of something: inside a solid, unless light gets there.
 
-    The rays of a point are two independent sets; how much they differ is how far the mean can be trusted.
+    The rays of a point are two independent sets; half their difference is how far the mean can be trusted.
     """
     columns = [np.ascontiguousarray(tables[:, k]) for k in range(tables.shape[1])]
     codes = hemispheres.codes
@@ -50,13 +50,13 @@ def gather_indirect(
         halves = np.stack([np.add.reduce(column[flat].reshape(-1, rays), axis=1) for column in columns], axis=1)
         halves = halves.reshape(len(code), 2, -1).astype(np.float64) / rays
         irradiance = (halves[:, 0] + halves[:, 1]) / 2.0
-        variance = (halves[:, 0] - halves[:, 1]) ** 2 / 4.0
+        deviation = (halves[:, 0] - halves[:, 1]) / 2.0
         behind = ((code >= codes.triangles) & (code < codes.escaped)).mean(axis=1)
-        return irradiance, variance, behind > _ENCLOSED
+        return irradiance, deviation, behind > _ENCLOSED
 
     parts = zip(*workers.map(work, len(points.positions), hemispheres.chunk), strict=True)
-    irradiance, variance, enclosed = (np.concatenate(p) for p in parts)
-    return irradiance, variance, enclosed
+    irradiance, deviation, enclosed = (np.concatenate(p) for p in parts)
+    return irradiance, deviation, enclosed
 
 
 def gather_direct(

@@ -10,7 +10,7 @@ import numpy as np
 from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
-from .tessellation import Int64, Tessellation, edge_for_count, split_triangles, triform, whole
+from .tessellation import Int64, Tessellation, edge_for_count, edge_keys, split_triangles, triform, whole
 
 #: Corners whose shading normals differ by less than this angle (cosine) share one value.
 _SAME_NORMAL = np.cos(np.radians(5.0))
@@ -149,8 +149,8 @@ def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
 
     Corner number 3 t + i is corner i of triangle t; row k of both arrays names the same two mesh vertices.
     """
-    a, b = triangles.reshape(-1).astype(np.int64), triangles[:, [1, 2, 0]].reshape(-1).astype(np.int64)
-    key = np.minimum(a, b) * (int(triangles.max(initial=0)) + 1) + np.maximum(a, b)
+    a = triangles.reshape(-1)
+    key = edge_keys(triangles, int(triangles.max(initial=0)) + 1).reshape(-1)
     order = np.argsort(key, kind="stable")
     ordered = key[order]
     start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
@@ -164,6 +164,13 @@ def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
     turned = a[one] != a[two]
     there[turned] = there[turned][:, ::-1]
     return here, there
+
+
+def numbered_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
+    """The number (t, 3) of the edge from each corner to the next, and the vertices (e, 2) at the ends of each edge."""
+    count = int(triangles.max(initial=0)) + 1
+    keys, number = np.unique(edge_keys(triangles, count), return_inverse=True)
+    return number.reshape(-1, 3), np.column_stack([keys // count, keys % count])
 
 
 def _components(count: int, one: np.ndarray, two: np.ndarray) -> np.ndarray:

@@ -11,119 +11,75 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .receivers import Receivers, shared_edges
+from .receivers import Receivers, numbered_edges, shared_edges
 from .scene import Bool, Float64, Int32
+from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradients
 
 #: Relative error at which conjugate gradients stop: a tenth of what a person asks for at the finest.
 _TOLERANCE = 5e-4
 _MAXIMUM_ITERATIONS = 100
-#: Entries of a row of the fit's matrix that are kept in line: more than a vertex of a sound mesh has.
-_WIDTH = 24
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
+#: Which of these six belongs to each side of a triangle.
+_SIDE_MOMENT = np.array([3, 5, 4])
+#: The pairs of the four vertices around an edge: its ends, each end and each apex, the apexes.
+_SIDE_START, _SIDE_END = np.array([0, 0, 1, 0, 1, 2]), np.array([1, 2, 2, 3, 3, 3])
 
 
 class Samples:
     """Sums over sample points on the cells: what the fit needs, however many samples there were.
 
-    moments (c, 6): products of barycentric weights (00, 11, 22, 01, 02, 12); light (c, 3, k): weight times value;
-    squares (c, k): squared values; noise (c, k): the values' own variances; count (c,): valid samples.
+    to_grey (k,): weights that turn the k channels into the mean light, by which errors are judged. moments (c, 6):
+    products of barycentric weights (00, 11, 22, 01, 02, 12); light (c, 3, k): weight times value; squares (c,): squared
+    mean light; noise (c,): its own variances; count (c,): valid samples.
     """
 
-    def __init__(self, cells: int, channels: int) -> None:
+    def __init__(self, cells: int, to_grey: Float64) -> None:
+        self.to_grey = to_grey
         self.moments = np.zeros((cells, 6))
-        self.light = np.zeros((cells, 3, channels))
-        self.squares = np.zeros((cells, channels))
-        self.noise = np.zeros((cells, channels))
+        self.light = np.zeros((cells, 3, len(to_grey)))
+        self.squares = np.zeros(cells)
+        self.noise = np.zeros(cells)
         self.count = np.zeros(cells)
 
     def add(self, index: np.ndarray | slice, weights: Float64, values: Float64, noise: Float64, valid: Bool) -> None:
-        """One sample for each cell of index: weights (n, 3) barycentric in the output triangle; values, noise (n, k);
-        an invalid one (n,) counts for nothing."""
+        """One sample for each cell of index: weights (n, 3) barycentric in the output triangle; values (n, k); noise
+        (n,) variance of the mean light; an invalid one (n,) counts for nothing."""
         used = weights * valid[:, None]
         self.moments[index] += used[:, _ROW] * weights[:, _COLUMN]
         self.light[index] += used[:, :, None] * values[:, None, :]
-        self.squares[index] += valid[:, None] * values**2
-        self.noise[index] += valid[:, None] * noise
+        self.squares[index] += valid * (values @ self.to_grey) ** 2
+        self.noise[index] += valid * noise
         self.count[index] += valid
 
     def __add__(self, other: Samples) -> Samples:
-        total = Samples(self.light.shape[0], self.light.shape[2])
-        for name in vars(total):
+        total = Samples(0, self.to_grey)
+        for name in ("moments", "light", "squares", "noise", "count"):
             setattr(total, name, getattr(self, name) + getattr(other, name))
         return total
 
-    def channel(self, k: int) -> Samples:
-        """The same samples with channel k alone."""
-        alone = Samples(0, 1)
-        alone.moments, alone.count = self.moments, self.count
-        for name in ("light", "noise", "squares"):
-            setattr(alone, name, getattr(self, name)[..., k][..., None])
+    def grey(self) -> Samples:
+        """The same samples of the mean light alone."""
+        alone = Samples(0, np.ones(1))
+        alone.moments, alone.squares, alone.noise, alone.count = self.moments, self.squares, self.noise, self.count
+        alone.light = (self.light @ self.to_grey)[:, :, None]
         return alone
 
     def squared_residual(self, corners: Float64) -> Float64:
-        """Mean (c, k) of (sample - interpolated)^2 over each cell's samples, for corner values (c, 3, k)."""
+        """Mean (c,) of (mean light - interpolated)^2 over each cell's samples, for corner values (c, 3)."""
         product = corners[:, _ROW] * corners[:, _COLUMN]
         product[:, 3:] *= 2.0
-        total = self.squares - 2.0 * np.einsum("cik,cik->ck", self.light, corners)
-        total += np.einsum("ci,cik->ck", self.moments, product)
-        return np.maximum(total, 0.0) / np.maximum(self.count, 1.0)[:, None]
-
-
-class SparseMatrix:
-    """Rows of about equal length, padded: columns and values (v, w). What a row has beyond w is kept aside."""
-
-    def __init__(self, indptr: np.ndarray, columns: np.ndarray, values: Float64) -> None:
-        length = np.diff(indptr)
-        width = int(min(length.max(initial=1), _WIDTH))
-        place = indptr[:-1, None] + np.arange(width)
-        filled = np.arange(width) < length[:, None]
-        place = np.where(filled, place, 0)
-        self._columns = columns[place]
-        self._values = np.where(filled, values[place], 0.0)
-        row = np.repeat(np.arange(len(length)), length)
-        beyond = np.arange(len(columns)) - indptr[row] >= width
-        self._rest = (row[beyond], columns[beyond], values[beyond])
-        self.diagonal = np.bincount(row, values * (columns == row), len(length))
-
-    def __matmul__(self, x: Float64) -> Float64:
-        """(v, k) to (v, k)."""
-        row, column, value = self._rest
-        product = np.empty_like(x)
-        for k in range(x.shape[1]):
-            channel = np.ascontiguousarray(x[:, k])
-            product[:, k] = np.einsum("vw,vw->v", self._values, channel[self._columns])
-            if len(row):
-                product[:, k] += np.bincount(row, value * channel[column], len(x))
-        return product
-
-
-class Pattern:
-    """Which entries a sum of triplets fills, found once and used for every set of values; all of the diagonal is."""
-
-    def __init__(self, count: int, rows: np.ndarray, columns: np.ndarray) -> None:
-        key = np.concatenate([rows.astype(np.int64) * count + columns, np.arange(count) * (count + 1)])
-        self._order = np.argsort(key, kind="stable")
-        ordered = key[self._order]
-        self._start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
-        row, column = np.divmod(ordered[self._start], count)
-        self._columns = column
-        self._indptr = np.searchsorted(row, np.arange(count + 1))
-        self._count = count
-
-    def total(self, values: Float64) -> Float64:
-        """Values of the entries: the sum of the triplets' values that fall on each."""
-        return np.asarray(np.add.reduceat(np.concatenate([values, np.zeros(self._count)])[self._order], self._start))
-
-    def matrix(self, values: Float64) -> SparseMatrix:
-        return SparseMatrix(self._indptr, self._columns, values)
+        total = self.squares - 2.0 * np.einsum("ci,ci->c", self.light @ self.to_grey, corners)
+        total += np.einsum("ci,ci->c", self.moments, product)
+        return np.maximum(total, 0.0) / np.maximum(self.count, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
 class System:
-    """mass: entries of the mass matrix in the fit's pattern; target (v, k); lumped (v,): the mass's row sums."""
+    """The mass matrix, by its diagonal (v,) and its edges (e,); target (v, k); lumped (v,): the mass's row sums."""
 
-    mass: Float64
+    diagonal: Float64
+    edges: Float64
     target: Float64
     lumped: Float64
 
@@ -144,39 +100,46 @@ class Fit:
             sampled &= receivers.cells.barycentric.max(axis=1) > 0
         self.measured = self._scatter(sampled) > 0
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
-        vertex, jump, weight = gradient_jumps(receivers, self.measured)
-        penalty = weight[:, None, None] * jump[:, :, None] * jump[:, None, :]
-        row = np.concatenate([self._corner[:, _ROW], self._corner[:, _COLUMN[3:]]], axis=1).ravel()
-        column = np.concatenate([self._corner[:, _COLUMN], self._corner[:, _ROW[3:]]], axis=1).ravel()
-        self._masses = len(row)
-        self._pattern = Pattern(
-            self._count,
-            np.concatenate([row, np.broadcast_to(vertex[:, :, None], penalty.shape).ravel()]),
-            np.concatenate([column, np.broadcast_to(vertex[:, None, :], penalty.shape).ravel()]),
+        self._edge, self._edge_ends = numbered_edges(receivers.corner_vertex)
+        jumps = gradient_jumps(receivers, self.measured)
+        apexes = jumps.vertices[:, 2:]
+        self._pattern = SymmetricPattern(self._count, np.concatenate([self._edge_ends, apexes]).astype(np.int64))
+        self._penalty = np.bincount(
+            jumps.vertices.ravel(), (jumps.weight[:, None] * jumps.jump**2).ravel(), self._count
         )
-        self._penalty = self._pattern.total(np.concatenate([np.zeros(self._masses), penalty.ravel()]))
-        self._penalties = penalty.size
+        products = jumps.weight[:, None] * jumps.jump[:, _SIDE_START] * jumps.jump[:, _SIDE_END]
+        on_edges = np.bincount(self._edge.ravel()[jumps.sides].ravel(), products[:, :-1].ravel(), len(self._edge_ends))
+        self._pair_penalty = np.concatenate([on_edges, products[:, -1]])
 
     def system(self, samples: Samples) -> System:
         """Mass matrix and right-hand side of one set of samples, each cell weighing as much as its area."""
         weight = self._receivers.cells.area / np.maximum(samples.count, 1)
         moments = samples.moments * weight[:, None]
-        entries = np.concatenate([moments, moments[:, 3:]], axis=1).ravel()
-        mass = self._pattern.total(np.concatenate([entries, np.zeros(self._penalties)]))
         light = samples.light * weight[:, None, None]
-        target = np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1)
-        return System(mass, target, self._scatter(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]]))
+        edges = self._edge[self._receivers.cells.element].ravel()
+        return System(
+            diagonal=self._scatter(moments[:, :3]),
+            edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)),
+            target=np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1),
+            lumped=self._scatter(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]]),
+        )
 
     def solve(self, system: System, alpha: float, start: Float64 | None = None) -> Float64:
         """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha.
 
         start (v, k): where to begin; by default plain averaging, which is near already.
         """
-        matrix = self._pattern.matrix(system.mass + alpha * self._penalty)
+        matrix = self.matrix(system, alpha)
         if start is None:
             averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
             start = np.where(self.measured[:, None], averaged, 0.0)
-        return conjugate_gradients(matrix, system.target, start)
+        return conjugate_gradients(matrix, system.target, start, _TOLERANCE, _MAXIMUM_ITERATIONS)
+
+    def matrix(self, system: System, alpha: float) -> SymmetricMatrix:
+        """The mass plus alpha times the penalty."""
+        pairs = alpha * self._pair_penalty
+        pairs[: len(system.edges)] += system.edges
+        return SymmetricMatrix(self._pattern, system.diagonal + alpha * self._penalty, pairs)
 
     def at_corners(self, values: Float64) -> Float64:
         """(c, 3, k): what interpolation of vertex values (v, k) starts from in each cell's output triangle."""
@@ -203,16 +166,27 @@ class Fit:
         return values
 
 
-def gradient_jumps(receivers: Receivers, measured: Bool) -> tuple[Int32, Float64, Float64]:
-    """Vertices (e, 4), coefficients (e, 4) and weights (e,) of the gradient's jump over each smooth interior edge.
+@dataclass(frozen=True, eq=False)
+class Jumps:
+    """The gradient's jump over smooth interior edges: vertices (j, 4) start, end and the two apexes; jump (j, 4) their
+    coefficients; weight (j,); sides (j, 5): the sides of triangles that join start and end, and each of them to each
+    apex, side 3 t + i of triangle t running from corner i to the next."""
+
+    vertices: Int32
+    jump: Float64
+    weight: Float64
+    sides: np.ndarray
+
+
+def gradient_jumps(receivers: Receivers, measured: Bool) -> Jumps:
+    """The jump of the gradient over each smooth interior edge between measured vertices.
 
     For an edge between triangles with apexes k and l the jump, made dimensionless by the lesser height over the edge,
     is (x_k - x at its foot) / h_k + (x_l - x at its foot) / h_l, zero for every linear function.
     """
     vertex = receivers.corner_vertex
     here, there = shared_edges(vertex)
-    apex_here = here[:, 0] - here[:, 0] % 3 + _third(here % 3)
-    apex_there = there[:, 0] - there[:, 0] % 3 + _third(there % 3)
+    apex_here, apex_there = _third(here), _third(there)
     flat = receivers.element_corners.reshape(-1, 3)
     start, end = flat[here[:, 0]], flat[here[:, 1]]
     along = end - start
@@ -233,34 +207,27 @@ def gradient_jumps(receivers: Receivers, measured: Bool) -> tuple[Int32, Float64
     flat_vertex = vertex.ravel()
     vertices = np.stack([flat_vertex[c] for c in (here[:, 0], here[:, 1], apex_here, apex_there)], axis=1)
     usable = solid & measured[vertices].all(axis=1)
+    # The side that joins the apex to one end of the edge lies opposite the other end.
+    sides = np.stack(
+        [
+            _opposite(apex_here),
+            _opposite(here[:, 1]),
+            _opposite(here[:, 0]),
+            _opposite(there[:, 1]),
+            _opposite(there[:, 0]),
+        ],
+        axis=1,
+    )
     weight = np.sqrt(squared) * mean / 3
-    return vertices[usable], jump[usable], weight[usable]
+    return Jumps(vertices[usable], jump[usable], weight[usable], sides[usable])
 
 
 def _third(ends: np.ndarray) -> np.ndarray:
-    """The corner of a triangle (0, 1, 2) that is neither end of an edge (e, 2)."""
-    return 3 - ends[:, 0] - ends[:, 1]
+    """The corner of the same triangle that is neither end of an edge, by numbers 3 t + i: (e, 2) to (e,)."""
+    first = ends[:, 0] - ends[:, 0] % 3
+    return np.asarray(first + 3 - ends[:, 0] % 3 - ends[:, 1] % 3)
 
 
-def conjugate_gradients(matrix: SparseMatrix, target: Float64, start: Float64) -> Float64:
-    """Solve matrix x = target (v, k) with Jacobi scaling; rows without weight keep their start."""
-    diagonal = matrix.diagonal
-    inverse = np.where(diagonal > 0, 1.0 / np.where(diagonal > 0, diagonal, 1.0), 0.0)[:, None]
-    x = start
-    residual = target - matrix @ x
-    scaled = inverse * residual
-    direction = scaled.copy()
-    energy = np.sum(residual * scaled, axis=0)
-    enough = _TOLERANCE**2 * np.maximum(np.sum(target * inverse * target, axis=0), np.finfo(float).tiny)
-    for _ in range(_MAXIMUM_ITERATIONS):
-        if (energy <= enough).all():
-            break
-        image = matrix @ direction
-        step = energy / np.maximum(np.sum(direction * image, axis=0), np.finfo(float).tiny)
-        x = x + step * direction
-        residual = residual - step * image
-        scaled = inverse * residual
-        fresh = np.sum(residual * scaled, axis=0)
-        direction = scaled + fresh / np.maximum(energy, np.finfo(float).tiny) * direction
-        energy = fresh
-    return x
+def _opposite(corner: np.ndarray) -> np.ndarray:
+    """The side opposite a corner: it begins at the next one."""
+    return np.asarray(corner - corner % 3 + (corner + 1) % 3)

@@ -116,7 +116,7 @@ def _mean_radiance(survey: Survey, scene: Scene, fits: list[Fitted]) -> float:
     receivers = survey.receivers
     cells = receivers.cells
     corner = receivers.corner_vertex[cells.element]
-    grey = np.sum([fitted.values[:, -1] for fitted in fits], axis=0)[corner].mean(axis=1)
+    grey = np.sum([fitted.grey for fitted in fits], axis=0)[corner].mean(axis=1)
     albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])[cells.surface]
     emission = np.array([np.mean(s.emission) for s in scene.surfaces])[cells.surface]
     return float(cells.area @ (emission + albedo * grey / np.pi) / cells.area.sum())

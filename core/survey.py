@@ -91,8 +91,8 @@ def inside_solid(enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
-    indirect: a channel for each column of the surroundings but the last, and then the mean irradiance of them all;
-    direct: red, green, blue and their mean. coarser (c,): sum over passes of the difference that coarser patches make.
+    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue. coarser (c,): sum
+    over passes of the difference that coarser patches make.
     """
 
     def __init__(
@@ -107,9 +107,9 @@ class Survey:
         count = len(receivers.cells)
         self.receivers = receivers
         self.surroundings = surroundings
-        channels = len(surroundings.to_grey) + 1 if surroundings else 0
-        self.indirect = [Samples(count, channels), Samples(count, channels)]
-        self.direct = [Samples(count, 4), Samples(count, 4)]
+        to_grey = surroundings.to_grey if surroundings else np.zeros(0)
+        self.indirect = [Samples(count, to_grey), Samples(count, to_grey)]
+        self.direct = [Samples(count, np.full(3, 1 / 3)), Samples(count, np.full(3, 1 / 3))]
         self.coarser = np.zeros(count)
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
@@ -144,19 +144,15 @@ class Survey:
     def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
         """Add the indirect light at the points; which of them (c,) are not inside a solid."""
         half = number % 2
-        arriving, variance, enclosed = gather_indirect(
+        arriving, deviation, enclosed = gather_indirect(
             points, around.hemispheres, around.tables[half], self._seed, number, self._workers
         )
         self.rays["gather"] += len(arriving) * around.hemispheres.rays
         self.coarser += arriving[:, -1] - arriving[:, :3].mean(axis=1)
-        values, noise = arriving[:, :-1], variance[:, :-1]
-        grey = values @ around.to_grey
-        valid = ~inside_solid(enclosed, grey, light.irradiance.mean(axis=1))
-        # The channels of one ray rise and fall together, so the mean's deviation is the mean of the deviations.
-        spread = (np.sqrt(noise) @ around.to_grey) ** 2
-        self.indirect[half].add(
-            slice(None), points.barycentric, np.column_stack([values, grey]), np.column_stack([noise, spread]), valid
-        )
+        values = arriving[:, :-1]
+        valid = ~inside_solid(enclosed, values @ around.to_grey, light.irradiance.mean(axis=1))
+        noise = (deviation[:, :-1] @ around.to_grey) ** 2
+        self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
         return valid
 
     def refine_boundaries(self, passes: int) -> None:
@@ -179,10 +175,10 @@ class Survey:
         cells, vertices = self.receivers.cells, self.receivers.vertices
         corner = self.receivers.corner_vertex[cells.element]
         boundary = shadow_boundary(corner, vertices, self._signatures)
-        samples = self.direct[0].channel(-1) + self.direct[1].channel(-1)
+        samples = self.direct[0].grey() + self.direct[1].grey()
         count = np.maximum(samples.count, 1.0)
         mean = samples.light.sum(axis=1)[:, 0] / count
-        variance = np.maximum(samples.squares[:, 0] / count - mean**2, 0.0) / count
+        variance = np.maximum(samples.squares / count - mean**2, 0.0) / count
         # Two equal samples prove little, so a cell is as uncertain as those around it.
         around = np.bincount(corner.ravel(), np.repeat(variance, 3), vertices) / np.bincount(
             corner.ravel(), minlength=vertices
@@ -198,6 +194,5 @@ class Survey:
     def _add_direct(
         self, half: int, index: NDArray[np.int64] | slice, points: Points, light: Illumination, valid: Bool
     ) -> None:
-        values = np.column_stack([light.irradiance, light.irradiance.mean(axis=1)])
-        noise = np.column_stack([light.variance, np.sqrt(light.variance).mean(axis=1) ** 2])
-        self.direct[half % 2].add(index, points.barycentric, values, noise, valid)
+        noise = np.sqrt(light.variance).mean(axis=1) ** 2
+        self.direct[half % 2].add(index, points.barycentric, light.irradiance, noise, valid)

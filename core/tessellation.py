@@ -73,7 +73,7 @@ def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int
     at_chosen = np.zeros(len(mesh.vertices), dtype=bool)
     at_chosen[mesh.triangles[chosen]] = True
     near = np.flatnonzero(np.count_nonzero(at_chosen[mesh.triangles], axis=1) > 1)
-    keys = _edge_keys(mesh.triangles[near], len(mesh.vertices))
+    keys = edge_keys(mesh.triangles[near], len(mesh.vertices))
     marked = np.zeros(mesh.triangles.shape, dtype=bool)
     marked[near] = np.isin(keys, keys[chosen[near]])
     return _split(mesh, marked)
@@ -99,14 +99,14 @@ def _split(mesh: Tessellation, marked: Bool) -> tuple[Tessellation, Int64]:
 def _midpoints(mesh: Tessellation, parents: Int64, marked: Bool) -> tuple[Int32, Float64]:
     """One new vertex for each marked edge (n, 3) of the parents (n,), shared by the triangles on both of its sides."""
     count = len(mesh.vertices)
-    unique, number = np.unique(_edge_keys(mesh.triangles[parents], count)[marked], return_inverse=True)
+    unique, number = np.unique(edge_keys(mesh.triangles[parents], count)[marked], return_inverse=True)
     first, second = unique // count, unique % count
     midpoint = np.full(marked.shape, -1, dtype=np.int32)
     midpoint[marked] = count + number.reshape(-1)
     return midpoint, np.concatenate([mesh.vertices, (mesh.vertices[first] + mesh.vertices[second]) / 2])
 
 
-def _edge_keys(triangles: Int32, vertices: int) -> Int64:
+def edge_keys(triangles: Int32, vertices: int) -> Int64:
     """(t, 3) a number for each edge, the same in both triangles that share it."""
     start, end = triangles.astype(np.int64), triangles[:, [1, 2, 0]]
     return np.asarray(np.minimum(start, end) * vertices + np.maximum(start, end))
