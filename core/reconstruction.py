@@ -119,7 +119,7 @@ class Fit:
         edges = self._edge[self._receivers.cells.element].ravel()
         return System(
             diagonal=self._scatter(moments[:, :3]),
-            edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)),
+            edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)).astype(np.float64),
             target=np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1),
             lumped=self._scatter(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]]),
         )

@@ -70,7 +70,8 @@ def conjugate_gradients(
 ) -> Float64:
     """Solve matrix x = target (n, k) with Jacobi scaling, in at most `most` steps.
 
-    start (n, k): where to begin; rows without weight keep it. tolerance: of the energy norm of the scaled residual, relative to that of the target.
+    start (n, k): where to begin; rows without weight keep it. tolerance: of the energy norm of the scaled residual,
+    relative to that of the target.
     """
     diagonal = matrix.diagonal
     inverse = np.where(diagonal > 0, 1.0 / np.where(diagonal > 0, diagonal, 1.0), 0.0)[:, None]
