@@ -1,4 +1,4 @@
-"""What the command line can do: bake a file, say what baking it would take, or measure what accuracy costs there."""
+"""What the command line can do: bake a file, say what that would take, measure what accuracy costs, and test itself."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import io
 import json
 import os
+import platform
 import shutil
 import signal
 import sys
@@ -17,7 +18,9 @@ from pathlib import Path
 from typing import NoReturn
 
 import bpy
+import numpy as np
 
+from ..core import self_test
 from ..core.ladder import QUICK, Scale
 from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
@@ -30,12 +33,16 @@ from .bake_scene import bake_objects
 from .preview import render_preview
 from .scene_reader import pick_receivers, read_scene
 
-SUCCESS, UNUSABLE, INTERRUPTED = 0, 2, 130
+SUCCESS, FAILED, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 #: Triangles of the middle of the accuracy ladder.
 _TRIANGLES = 20_000
 
 MANIFEST = Path(__file__).resolve().parent.parent / "blender_manifest.toml"
+
+
+class SelfTestError(Exception):
+    """A closed form came out wrong. The message says how many, and what to do."""
 
 
 class FileError(Exception):
@@ -55,6 +62,9 @@ def run(arguments: Sequence[str]) -> int:
     except (FileError, SceneError) as problem:
         print(f"radiosity-baker: {problem}", file=sys.stderr)
         return UNUSABLE
+    except SelfTestError as problem:
+        print(f"radiosity-baker: {problem}", file=sys.stderr)
+        return FAILED
     except (Cancelled, KeyboardInterrupt):
         print("radiosity-baker: Interrupted; nothing was written.", file=sys.stderr)
         return INTERRUPTED
@@ -165,6 +175,32 @@ def _accuracy(options: argparse.Namespace, progress: Progress) -> None:
     except accuracy_plot.NoPlotting as problem:
         say(str(problem))
     say(f"\n{table}\nWritten to {folder}.")
+
+
+def _self_test(options: argparse.Namespace, progress: Progress) -> None:
+    """Compute what is known in closed form, in this Blender on this machine, and say how far off each came out."""
+    outcomes = []
+
+    def remember() -> Iterator[self_test.Outcome]:
+        for outcome in self_test.run_all(progress):
+            outcomes.append(outcome)
+            yield outcome
+
+    for line in self_test.table(remember()):
+        if not options.quiet:
+            print(line, flush=True)
+    failed = sum(not outcome.passed for outcome in outcomes)
+    where = (
+        f"Radiosity Baker {_version()}, Blender {bpy.app.version_string}, Python {platform.python_version()}, "
+        f"numpy {np.__version__}, {platform.platform()}"
+    )
+    if failed:
+        raise SelfTestError(
+            f"{failed} of {len(outcomes)} closed forms came out wrong: do not trust bakes made here, and report this "
+            f"table with this line. {where}."
+        )
+    if not options.quiet:
+        print(f"All {len(outcomes)} closed forms came out right. {where}.")
 
 
 def _say_what_was_done(report: Report, *, quiet: bool) -> None:
@@ -292,6 +328,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_accuracy_arguments(ladder)
     ladder.set_defaults(command=_accuracy)
+    check = commands.add_parser(
+        "self-test", help="compute what is known exactly, and compare", description=_self_test.__doc__
+    )
+    check.add_argument("--quiet", action="store_true", help="print problems only")
+    check.set_defaults(command=_self_test)
     return parser
 
 

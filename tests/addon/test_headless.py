@@ -16,6 +16,7 @@ import pytest
 
 from radiosity_baker.addon import command_line, preview
 from radiosity_baker.addon.headless import main, register_command, unregister_command
+from radiosity_baker.core import self_test
 from radiosity_baker.core.result import BakeResult, Report
 from radiosity_baker.core.settings import Settings
 
@@ -347,3 +348,26 @@ def test_the_command_can_be_registered_again_after_it_was_unregistered():
 @pytest.fixture(autouse=True)
 def small_pictures(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(preview, "WIDTH", 64)
+
+
+def outcomes(*errors: float) -> list[self_test.Outcome]:
+    return [self_test.Outcome(f"case {number}", 1.0, 1.0 + e, e, 0.5) for number, e in enumerate(errors)]
+
+
+def test_the_self_test_prints_case_exact_got_error_and_verdict(monkeypatch, capsys):
+    monkeypatch.setattr(self_test, "run_all", lambda _: iter(outcomes(0.0, 0.25)))
+    assert main(["self-test"]) == 0
+    heading, first, second, summary = capsys.readouterr().out.splitlines()
+    assert heading.split() == ["case", "exact", "got", "error", "verdict"]
+    assert first.split() == ["case", "0", "1", "1", "0.0e+00", "ok"]
+    assert second.split() == ["case", "1", "1", "1.25", "2.5e-01", "ok"]
+    assert summary.startswith("All 2 closed forms came out right.")
+
+
+def test_the_self_test_fails_loudly(monkeypatch, capsys):
+    monkeypatch.setattr(self_test, "run_all", lambda _: iter(outcomes(0.0, 0.75, float("nan"))))
+    assert main(["self-test", "--quiet"]) == 1
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert "2 of 3 closed forms came out wrong" in captured.err
+    assert bpy.app.version_string in captured.err

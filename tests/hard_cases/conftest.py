@@ -1,0 +1,20 @@
+"""What every case leaves behind for the table in docs/reliability.md: properties in pytest's own XML report."""
+
+from __future__ import annotations
+
+import pytest
+
+
+@pytest.fixture
+def told(record_property):
+    """Tell what a case is about, and assert that it keeps its bound.
+
+    exact: the true figure, or None where only the bound is known; got: what came out; allowed: how far it may be off.
+    """
+
+    def tell(case: str, exact: float, got: float, allowed: float, catches: str = "") -> None:
+        for name, value in (("case", case), ("exact", exact), ("got", got), ("allowed", allowed), ("catches", catches)):
+            record_property(name, value)
+        assert abs(got - exact) <= allowed, f"{case}: {got} instead of {exact}, more than {allowed} away. {catches}"
+
+    return tell
