@@ -69,8 +69,8 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:
         lowest, alpha, residual, spread = score, candidate, predicted, squared_mean(first - second)
     count = np.maximum(grey[0].count + grey[1].count, 1.0)
     own_noise = (grey[0].noise + grey[1].noise) / count
-    merged = fit.system(halves[0] + halves[1])
-    together = fit.fill(np.maximum(fit.solve(merged, alpha), 0.0))
+    merged = halves[0] + halves[1]
+    together = fit.solve_within(fit.system(merged), alpha, merged)
     return Fitted(alpha, together, together @ halves[0].to_grey, spread / 4.0, residual - own_noise - spread / 2.0)
 
 

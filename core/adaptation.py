@@ -22,7 +22,7 @@ from .plan import Effort
 from .receivers import Receivers, split_cells
 from .sampling import stream
 from .scene import Bool, Float64, Scene
-from .survey import Surroundings, inside_solid
+from .survey import Surroundings, out_of_sight
 from .tessellation import Int64, split_triangles
 from .visibility import Visibility
 
@@ -150,7 +150,9 @@ class Adaptation:
                     some, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
                 )
                 grey = arriving[:, :-1] @ self._around.to_grey
-                hidden[near_contact] = inside_solid(enclosed, grey, direct[near_contact])
+                hidden[near_contact] = out_of_sight(
+                    some, self._around.hemispheres, enclosed, grey, direct[near_contact]
+                )
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))

@@ -23,6 +23,7 @@ class Points:
         self.weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
         self.positions = np.einsum("nc,nck->nk", self.weights, cells.corners[chosen])
         self.normals = cells.normals[chosen]
+        self.size = np.sqrt(2.0 * cells.area[chosen])
         self.barycentric = self.weights
         if cells.barycentric is not None:
             self.barycentric = np.einsum("nc,nck->nk", self.weights, cells.barycentric[chosen])

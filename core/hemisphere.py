@@ -12,7 +12,7 @@ import numpy as np
 
 from .patches import Patches
 from .sampling import cosine_patterns, frames
-from .scene import Float32, Float64
+from .scene import Bool, Float32, Float64
 from .visibility import Visibility, offset_along
 
 #: Rays a chunk: few enough to stay in the processor's caches, enough that Python hardly counts.
@@ -78,6 +78,11 @@ class Hemispheres:
             below = directions.reshape(count, self.rays, 3)[tilted] @ normals[tilted].astype(np.float32)[:, :, None]
             code[tilted] = np.where(below[..., 0] <= 0, self.codes.lost, code[tilted])
         return code
+
+    def covered(self, points: Float64, normals: Float64, reach: Float64) -> Bool:
+        """Whether something lies within reach (n,) straight above each point (n, 3)."""
+        ways = (reach[:, None] * normals).astype(np.float32)
+        return ~self._visibility.unblocked_along(offset_along(points, normals), ways)
 
     def _from_behind(self, hit: np.ndarray, directions: Float32) -> np.ndarray:
         """Whether each ray met the back of a triangle; False for rays that met nothing."""

@@ -31,7 +31,8 @@ class Samples:
 
     to_grey (k,): weights that turn the k channels into the mean light, by which errors are judged. moments (c, 6):
     products of barycentric weights (00, 11, 22, 01, 02, 12); light (c, 3, k): weight times value; squares (c,): squared
-    mean light; noise (c,): its own variances; count (c,): valid samples.
+    mean light; noise (c,): its own variances; low, high (c, k): the least and the largest value; count (c,): valid
+    samples; tried (c,): with the invalid ones.
     """
 
     def __init__(self, cells: int, to_grey: Float64) -> None:
@@ -40,7 +41,10 @@ class Samples:
         self.light = np.zeros((cells, 3, len(to_grey)))
         self.squares = np.zeros(cells)
         self.noise = np.zeros(cells)
+        self.low = np.full((cells, len(to_grey)), np.inf)
+        self.high = np.full((cells, len(to_grey)), -np.inf)
         self.count = np.zeros(cells)
+        self.tried = np.zeros(cells)
 
     def add(self, index: np.ndarray | slice, weights: Float64, values: Float64, noise: Float64, valid: Bool) -> None:
         """One sample for each cell of index: weights (n, 3) barycentric in the output triangle; values (n, k); noise
@@ -50,18 +54,23 @@ class Samples:
         self.light[index] += used[:, :, None] * values[:, None, :]
         self.squares[index] += valid * (values @ self.to_grey) ** 2
         self.noise[index] += valid * noise
+        self.low[index] = np.minimum(self.low[index], np.where(valid[:, None], values, np.inf))
+        self.high[index] = np.maximum(self.high[index], np.where(valid[:, None], values, -np.inf))
         self.count[index] += valid
+        self.tried[index] += 1
 
     def __add__(self, other: Samples) -> Samples:
         total = Samples(0, self.to_grey)
-        for name in ("moments", "light", "squares", "noise", "count"):
+        for name in ("moments", "light", "squares", "noise", "count", "tried"):
             setattr(total, name, getattr(self, name) + getattr(other, name))
+        total.low, total.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
         return total
 
     def grey(self) -> Samples:
         """The same samples of the mean light alone."""
         alone = Samples(0, np.ones(1))
-        alone.moments, alone.squares, alone.noise, alone.count = self.moments, self.squares, self.noise, self.count
+        for name in ("moments", "squares", "noise", "count", "tried"):
+            setattr(alone, name, getattr(self, name))
         alone.light = (self.light @ self.to_grey)[:, :, None]
         return alone
 
@@ -88,7 +97,8 @@ class Fit:
     """Least squares onto the fit vertices of the receivers.
 
     count (c,): valid samples of each cell; where there is none the fit has nothing to say, and `fill` does.
-    hidden (c,): cells of which some sample was inside a solid.
+    hidden (c,): cells of which some sample was out of sight. Of the vertices (v,), those that no valid sample tells of
+    are not `measured`; they are `filled` when they share an edge with one that is, since what is seen reaches there.
     """
 
     def __init__(self, receivers: Receivers, count: Float64, hidden: Bool) -> None:
@@ -101,7 +111,10 @@ class Fit:
         self.measured = self._scatter(sampled) > 0
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
         self._edge, self._edge_ends = numbered_edges(receivers.corner_vertex)
+        self.filled = ~self.measured & self._beside_measured()
         jumps = gradient_jumps(receivers, self.measured)
+        around = np.bincount(receivers.corner_vertex.ravel(), minlength=self._count)
+        self._surrounded = np.bincount(jumps.vertices[:, :2].ravel(), minlength=self._count) == around
         apexes = jumps.vertices[:, 2:]
         self._pattern = SymmetricPattern(self._count, np.concatenate([self._edge_ends, apexes]).astype(np.int64))
         self._penalty = np.bincount(
@@ -112,8 +125,8 @@ class Fit:
         self._pair_penalty = np.concatenate([on_edges, products[:, -1]])
 
     def system(self, samples: Samples) -> System:
-        """Mass matrix and right-hand side of one set of samples, each cell weighing as much as its area."""
-        weight = self._receivers.cells.area / np.maximum(samples.count, 1)
+        """Mass matrix and right-hand side of one set of samples, each cell weighing as much as its area in sight."""
+        weight = self._receivers.cells.area / np.maximum(samples.tried, 1)
         moments = samples.moments * weight[:, None]
         light = samples.light * weight[:, None, None]
         edges = self._edge[self._receivers.cells.element].ravel()
@@ -129,11 +142,48 @@ class Fit:
 
         start (v, k): where to begin; by default plain averaging, which is near already.
         """
+        start = self._averages(system) if start is None else start
+        return conjugate_gradients(self.matrix(system, alpha), system.target, start, _TOLERANCE, _MAXIMUM_ITERATIONS)
+
+    def solve_within(self, system: System, alpha: float, samples: Samples) -> Float64:
+        """Vertex values (v, k) as those of `solve`, but none brighter or darker than the light around it, and filled.
+
+        Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
+        the vertex is held at the limit, and the others make the best of that.
+        """
         matrix = self.matrix(system, alpha)
-        if start is None:
-            averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
-            start = np.where(self.measured[:, None], averaged, 0.0)
-        return conjugate_gradients(matrix, system.target, start, _TOLERANCE, _MAXIMUM_ITERATIONS)
+        accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
+        free = conjugate_gradients(matrix, system.target, self._averages(system), *accuracy)
+        low, high = self._range(samples)
+        values = np.clip(free, low, high)
+        held = values != free
+        if held.any():
+            values = np.clip(conjugate_gradients(matrix, system.target, values, *accuracy, held), low, high)
+        return self.fill(values)
+
+    def _averages(self, system: System) -> Float64:
+        averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
+        return np.where(self.measured[:, None], averaged, 0.0)
+
+    def _range(self, samples: Samples) -> tuple[Float64, Float64]:
+        """Least and largest light (v, k) that a vertex may have: that of the samples in the triangles around it.
+
+        At the rim of a surface all samples lie to one side. The nearest of n samples misses the vertex by about
+        1 / sqrt(n) of the triangle's size, so light may go on rising or falling by twice that share of what it does
+        among them; but not where the other side is out of sight.
+        """
+        shape = (self._count, samples.low.shape[1])
+        low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
+        cut_off = np.zeros(self._count, dtype=bool)
+        for corner in self._corner.T:
+            np.minimum.at(low, corner, samples.low)
+            np.maximum.at(high, corner, samples.high)
+            cut_off[corner[samples.tried > samples.count]] = True
+        low, high = (np.where(np.isfinite(limit), limit, 0.0) for limit in (low, high))
+        samples_around = self._scatter(np.repeat(samples.count[:, None], 3, axis=1))
+        share = np.where(self._surrounded | cut_off, 0.0, 2.0 / np.sqrt(np.maximum(samples_around, 4.0)))
+        beyond = share[:, None] * (high - low)
+        return np.maximum(low - beyond, 0.0), high + beyond
 
     def matrix(self, system: System, alpha: float) -> SymmetricMatrix:
         """The mass plus alpha times the penalty."""
@@ -149,21 +199,31 @@ class Fit:
         return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count).astype(np.float64)
 
     def fill(self, values: Float64) -> Float64:
-        """Give vertices without a sample the mean of their neighbours, ring by ring; but not those that lie in the
-        dark inside of a solid, where there is no light and nobody looks."""
-        known = self.measured | self.hidden
-        corners = self._receivers.corner_vertex
-        one, two = corners.ravel(), corners[:, [1, 2, 0]].ravel()
-        one, two = np.concatenate([one, two]), np.concatenate([two, one])
-        edge = self.measured[one] & ~known[two]
+        """Give vertices without a sample the mean of their neighbours, ring by ring. Inside a solid only the first
+        ring: what is seen reaches no further, and beyond it is as dark as that inside is."""
+        known = self.measured
+        one, two = self._neighbours()
+        edge = known[one] & ~known[two]
         while edge.any():
             share = np.bincount(two[edge], minlength=self._count)
             total = [np.bincount(two[edge], v[one[edge]], self._count) for v in values.T]
             fresh = share > 0
             values[fresh] = (np.stack(total, axis=1) / np.maximum(share, 1)[:, None])[fresh]
-            known |= fresh
+            known = known | fresh | self.hidden
             edge = fresh[one] & ~known[two]
         return values
+
+    def _neighbours(self) -> tuple[Int32, Int32]:
+        """Both ends of all edges, each edge both ways."""
+        one, two = self._edge_ends.T
+        return np.concatenate([one, two]), np.concatenate([two, one])
+
+    def _beside_measured(self) -> Bool:
+        """(v,) vertices that share an edge with a measured one."""
+        one, two = self._neighbours()
+        beside = np.zeros(self._count, dtype=bool)
+        beside[two[self.measured[one]]] = True
+        return beside
 
 
 @dataclass(frozen=True, eq=False)

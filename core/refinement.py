@@ -27,7 +27,8 @@ class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
     reflected, emitted, lamps (v, 3); open_sky (v,) share of the hemisphere; error; cell_error (c,) mean square of each
-    cell's radiance error; hidden: vertices inside solids, which stay dark.
+    cell's radiance error; vertices: how many there are, how many no valid sample tells of and were
+    filled from their neighbours, and how many lie so deep inside solids that they stay dark.
     """
 
     reflected: Float64
@@ -36,7 +37,7 @@ class Light:
     lamps: Float64
     error: ErrorEstimate
     cell_error: Float64
-    hidden: int
+    vertices: dict[str, int]
 
 
 def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, workers: Workers, clock: Clock) -> Light:
@@ -107,7 +108,11 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
         lamps=fits[0].values[:, :3],
         error=error,
         cell_error=cell_error,
-        hidden=int(np.count_nonzero(fit.hidden)),
+        vertices={
+            "all": receivers.vertices,
+            "filled": int(np.count_nonzero(fit.filled)),
+            "hidden": int(np.count_nonzero(fit.hidden & ~fit.filled)),
+        },
     )
 
 

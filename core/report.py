@@ -45,6 +45,7 @@ def make_report(
             {"name": o.name, "attribute": "", "triangles": len(o.triangles), "corners": 3 * len(o.triangles)}
             for o in objects
         ],
+        vertices=light.vertices,
         peak_memory_mb=peak_memory_mb(),
         warnings=[*scene.warnings, *_warnings(settings, light)],
     )

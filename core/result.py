@@ -48,6 +48,7 @@ class Report:
     energy: dict[str, float] = field(default_factory=dict)
     effects: list[Effect] = field(default_factory=list)
     objects: list[dict[str, Any]] = field(default_factory=list)
+    vertices: dict[str, int] = field(default_factory=dict)
     peak_memory_mb: float = 0.0
     warnings: list[str] = field(default_factory=list)
     version: str = ""

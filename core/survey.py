@@ -24,7 +24,7 @@ from .scene import Bool, Float32, Float64
 from .transport import Transport
 from .visibility import Visibility
 
-#: A point that sees only backs, and less than this share of the mean light, is inside a solid.
+#: A point that gets less than this share of the mean light is dark.
 _DARK = 0.05
 
 
@@ -79,13 +79,22 @@ def _table(half: Transport, sky: bool, emitters: bool) -> Float32:
     return np.concatenate(columns, axis=1)
 
 
-def inside_solid(enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
-    """Points (n,) that see only backs, and no light to speak of: the inside of a solid, which nobody ever sees.
+def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
+    """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or where something
+    lies on the surface, or over it by less than the size of a cell.
 
-    A room whose normals face outward is all backs too, but light gets into it. indirect, direct (n,): mean irradiance.
+    A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
+    reaches count. indirect, direct (n,): mean irradiance.
     """
     total = indirect + direct
-    return np.asarray(enclosed & (total <= _DARK * total.mean()) & (direct <= 0))
+    dark = (total <= _DARK * total.mean()) & (direct <= 0)
+    hidden = dark & enclosed
+    open_ahead = np.flatnonzero(dark & ~enclosed)
+    if len(open_ahead):
+        hidden[open_ahead] = hemispheres.covered(
+            points.positions[open_ahead], points.normals[open_ahead], points.size[open_ahead]
+        )
+    return np.asarray(hidden)
 
 
 class Survey:
@@ -124,7 +133,7 @@ class Survey:
 
     @property
     def valid_samples(self) -> Float64:
-        """(c,) samples of each cell that are not inside a solid."""
+        """(c,) samples of each cell that are in sight."""
         return self.direct[0].count + self.direct[1].count
 
     def run_pass(self) -> None:
@@ -142,7 +151,7 @@ class Survey:
         self.passes += 1
 
     def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
-        """Add the indirect light at the points; which of them (c,) are not inside a solid."""
+        """Add the indirect light at the points; which of them (c,) are in sight."""
         half = number % 2
         arriving, deviation, enclosed = gather_indirect(
             points, around.hemispheres, around.tables[half], self._seed, number, self._workers
@@ -150,7 +159,8 @@ class Survey:
         self.rays["gather"] += len(arriving) * around.hemispheres.rays
         self.coarser += arriving[:, -1] - arriving[:, :3].mean(axis=1)
         values = arriving[:, :-1]
-        valid = ~inside_solid(enclosed, values @ around.to_grey, light.irradiance.mean(axis=1))
+        grey = values @ around.to_grey
+        valid = ~out_of_sight(points, around.hemispheres, enclosed, grey, light.irradiance.mean(axis=1))
         noise = (deviation[:, :-1] @ around.to_grey) ** 2
         self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
         return valid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene import Float64
+from .scene import Bool, Float64
 from .tessellation import Int64
 
 #: Share of the rows that are kept in line whole; what longer rows have beyond that width is kept aside.
@@ -66,15 +66,22 @@ class SymmetricMatrix:
 
 
 def conjugate_gradients(
-    matrix: SymmetricMatrix, target: Float64, start: Float64, tolerance: float, most: int
+    matrix: SymmetricMatrix,
+    target: Float64,
+    start: Float64,
+    tolerance: float,
+    most: int,
+    held: Bool | None = None,
 ) -> Float64:
     """Solve matrix x = target (n, k) with Jacobi scaling, in at most `most` steps.
 
-    start (n, k): where to begin; rows without weight keep it. tolerance: of the energy norm of the scaled residual,
-    relative to that of the target.
+    start (n, k): where to begin; rows without weight keep it, and so do held (n, k) values. tolerance: of the energy
+    norm of the scaled residual, relative to that of the target.
     """
     diagonal = matrix.diagonal
     inverse = np.where(diagonal > 0, 1.0 / np.where(diagonal > 0, diagonal, 1.0), 0.0)[:, None]
+    if held is not None:
+        inverse = np.where(held, 0.0, inverse)
     x = start.copy()
     residual = target - matrix @ x
     scaled = inverse * residual

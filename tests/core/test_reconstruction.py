@@ -253,7 +253,8 @@ def test_halves_of_the_samples_add_up_to_all(floor):
     one, two = sample(floor, slope, seed=1), sample(floor, noise, seed=2)
     both = one + two
     for name in vars(both).keys() - {"to_grey"}:
-        assert (getattr(both, name) == getattr(one, name) + getattr(two, name)).all()
+        together = {"low": np.minimum, "high": np.maximum}.get(name, np.add)
+        assert (getattr(both, name) == together(getattr(one, name), getattr(two, name))).all()
     grey = both.grey()
     assert grey.light[..., 0] == pytest.approx(both.light.mean(axis=2), rel=1e-12)
     assert (grey.squares == both.squares).all()
@@ -265,3 +266,68 @@ def test_samples_go_to_the_cells_they_are_meant_for(floor):
     assert np.flatnonzero(samples.count).tolist() == [3, 5]
     assert samples.light[3].tolist() == [[1 / 3]] * 3
     assert samples.noise[5] == 0.25
+
+
+@pytest.fixture(scope="module")
+def fine_floor(build):
+    return receive(build, build.quad(u=(2, 0, 0)), size=0.15)
+
+
+def covered(floor, radius):
+    """Cells whose middle lies within a round solid that stands on the floor, and the fit of an even light beside it."""
+    inside = np.linalg.norm(floor.cells.corners.mean(axis=1) - [0.1, 0.0, 0], axis=1) < radius
+    samples = sample(floor, lambda points: np.full((len(points), 1), 5.0), valid=~inside)
+    fit = Fit(floor, samples.count, samples.tried > samples.count)
+    return inside, fit, fit.solve_within(fit.system(samples), 0.05, samples)
+
+
+def test_what_is_seen_never_shades_into_the_dark_inside_of_a_solid(fine_floor):
+    """Every triangle that has a corner in the light is light, whole; what lies deeper stays dark."""
+    inside, fit, values = covered(fine_floor, 0.45)
+    shown = fit.at_corners(values)[..., 0]
+    assert shown[~inside] == pytest.approx(5.0, rel=1e-3)
+    assert fit.filled.any()
+    assert values[fit.filled] == pytest.approx(5.0, rel=1e-3)
+    deep = fit.hidden & ~fit.filled
+    assert deep.any()
+    assert (values[deep] == 0).all()
+
+
+def test_nothing_is_filled_where_all_is_in_sight(floor):
+    _, fit, _ = covered(floor, 0.0)
+    assert fit.measured.all()
+    assert not fit.filled.any()
+
+
+@pytest.mark.usefixtures("exactly")
+def test_no_vertex_is_brighter_or_darker_than_the_light_around_it(floor):
+    """Beside a step the nearest linear elements overshoot; held, they keep the mean to within what the step allows."""
+
+    def step(points):
+        return np.where(points[:, :1] > 0.13, 3.0, 1.0)
+
+    samples = sample(floor, step, passes=12)
+    fit = fit_of(floor, samples.count)
+    system = fit.system(samples)
+    free, within = fit.solve(system, 0.02), fit.solve_within(system, 0.02, samples)
+    assert free.max() > 3.05
+    assert free.min() < 0.95
+    inner = (np.abs(at_vertices(floor, lambda points: points)[:, :2]) < [0.99, 0.49]).all(axis=1)
+    assert within[inner].min() >= 1.0
+    assert within[inner].max() <= 3.0
+
+    def distance(values):
+        return samples.squared_residual(fit.at_corners(values)[..., 0]).mean()
+
+    assert distance(within) < 1.15 * distance(free)
+    clipped = np.where(inner[:, None], np.clip(free, 1.0, 3.0), within)
+    assert distance(within) < distance(clipped), "the others make the best of it"
+
+
+@pytest.mark.usefixtures("exactly")
+def test_the_limits_leave_linear_light_alone(floor):
+    """To the rim, where no sample is as bright or as dark as the vertex."""
+    samples = sample(floor, lambda points: 10.0 + slope(points), passes=12)
+    fit = fit_of(floor, samples.count)
+    within = fit.solve_within(fit.system(samples), 0.02, samples)
+    assert within == pytest.approx(at_vertices(floor, lambda points: 10.0 + slope(points)), abs=1e-6)
