@@ -48,12 +48,21 @@ def _check_object(scene_object: SceneObject, surfaces: int) -> None:
         raise SceneError(f"'{name}' has faces whose material does not exist: assign a material to all of them.")
     if not np.isfinite(vertices[triangles]).all():
         raise SceneError(f"'{name}' has vertices without finite coordinates: delete them, or undo what made them.")
+    if scene_object.uv is not None and not np.isfinite(scene_object.uv).all():
+        raise SceneError(f"'{name}' has UV coordinates that are not numbers: unwrap it again.")
+    if scene_object.colors is not None and not (
+        np.isfinite(scene_object.colors).all() and scene_object.colors.min() >= 0
+    ):
+        raise SceneError(f"'{name}' has vertex colours that are negative or not numbers: paint it again.")
 
 
 def _check_surface(surface: Surface, warnings: list[str]) -> Surface:
     values = np.array([*surface.albedo, *surface.emission])
     if not np.isfinite(values).all() or values.min() < 0:
         raise SceneError(f"Material '{surface.name}' has a colour that is negative or not a number: pick another.")
+    for texture in (surface.albedo_texture, surface.emission_texture):
+        if texture is not None and not (np.isfinite(texture.pixels).all() and texture.pixels.min() >= 0):
+            raise SceneError(f"Material '{surface.name}' has an image with values that are negative or not numbers.")
     if max(surface.albedo) <= ALBEDO_LIMIT:
         return surface
     warnings.append(

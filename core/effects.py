@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, log
+from typing import Any, Literal
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .patches import triangle_geometry
 from .result import Effect
 from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp
 from .settings import Settings
+from .textures import triangle_colours, varying_albedo, varying_emission
 
 #: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
 MOST_PANELS = 64
@@ -100,10 +102,23 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
     return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter")
 
 
+def albedo_textures(scene: Scene, _: Settings) -> Effect:
+    varying = [o.name for o in scene.objects if varying_albedo(scene, o)]
+    if not varying:
+        return Effect("albedo textures", False, "every surface has one colour")
+    return Effect("albedo textures", True, f"the colour changes over {_names(varying)}")
+
+
+def textured_emission(scene: Scene, _: Settings) -> Effect:
+    varying = [o.name for o in scene.objects if varying_emission(scene, o)]
+    if not varying:
+        return Effect("textured emission", False, "no surface emits more in one place than in another")
+    return Effect("textured emission", True, f"what shines changes over {_names(varying)}")
+
+
 def emitting_triangles(scene: Scene) -> int:
     """How many triangles emit light."""
-    emits = np.array([max(s.emission) > 0 for s in scene.surfaces])
-    return sum(int(np.count_nonzero(emits[o.surface])) for o in scene.objects)
+    return sum(int(np.count_nonzero(triangle_colours(scene, o).emission.max(axis=1) > 0)) for o in scene.objects)
 
 
 def _lamps(name: str, kind: type, scene: Scene) -> Effect:
@@ -127,11 +142,10 @@ def _has_size(lamp: Lamp) -> bool:
 
 def _mean_albedo(scene: Scene) -> float:
     """Mean over the surface and the channels."""
-    albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])
     total = area = 0.0
     for scene_object in scene.objects:
         areas = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
-        total += float(areas @ albedo[scene_object.surface])
+        total += float(areas @ triangle_colours(scene, scene_object).albedo.mean(axis=1))
         area += float(areas.sum())
     return total / area if area else 0.0
 
@@ -159,6 +173,30 @@ def _without_emission(scene: Scene) -> Scene:
     return replace(scene, surfaces=tuple(replace(s, emission=(0.0, 0.0, 0.0)) for s in scene.surfaces))
 
 
+def _with_even(name: Literal["albedo", "emission"]) -> Callable[[Scene], Scene]:
+    """Each surface's albedo or emission becomes its mean over all that has the surface."""
+
+    def evened(scene: Scene) -> Scene:
+        varying = varying_albedo if name == "albedo" else varying_emission
+        if not any(varying(scene, o) for o in scene.objects):
+            return scene
+        total, area = np.zeros((len(scene.surfaces), 3)), np.full(len(scene.surfaces), np.finfo(float).tiny)
+        for scene_object in scene.objects:
+            areas = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
+            values = getattr(triangle_colours(scene, scene_object), name)
+            np.add.at(total, scene_object.surface, areas[:, None] * values)
+            np.add.at(area, scene_object.surface, areas)
+        means: list[dict[str, Any]] = [
+            {name: tuple(mean), f"{name}_texture": None} for mean in (total / area[:, None]).tolist()
+        ]
+        surfaces = tuple(replace(s, **mean) for s, mean in zip(scene.surfaces, means, strict=True))
+        if name == "emission":
+            return replace(scene, surfaces=surfaces)
+        return replace(scene, surfaces=surfaces, objects=tuple(replace(o, colors=None) for o in scene.objects))
+
+    return evened
+
+
 def _without_sky(scene: Scene) -> Scene:
     return replace(scene, sky=(0.0, 0.0, 0.0))
 
@@ -177,4 +215,6 @@ EFFECTS: dict[str, Rule] = {
     "emitting surfaces": Rule(emitting_surfaces, _without_emission),
     "sky": Rule(sky, _without_sky),
     "bounces": Rule(bounces, _unchanged),
+    "albedo textures": Rule(albedo_textures, _with_even("albedo")),
+    "textured emission": Rule(textured_emission, _with_even("emission")),
 }

@@ -11,11 +11,17 @@ from .refinement import Light
 from .result import BakedObject
 from .scene import Float32, Float64, Scene, SceneError
 from .settings import LAYERS
+from .textured_fit import TexturedFit
+from .textures import constant_colours, varies
 
 
 def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple[str, ...]) -> Iterator[BakedObject]:
-    """The receivers with the asked layers, radiance in W/(m^2 sr) at every corner."""
-    layers = {name: radiance(name, scene, receivers, light) for name in names}
+    """The receivers with the asked layers, radiance in W/(m^2 sr) at every corner.
+
+    Raises SceneError for a layer that does not exist.
+    """
+    layers = Layers(scene, receivers, light)
+    values = {name: layers.radiance(name) for name in names}
     for number, (receiver, mesh) in enumerate(zip(receivers.objects, receivers.meshes, strict=True)):
         part = slice(receivers.first[number], receivers.first[number + 1])
         yield BakedObject(
@@ -24,33 +30,47 @@ def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple
             mesh.triangles,
             mesh.parent,
             mesh.barycentric,
-            {name: values[part] for name, values in layers.items()},
+            {name: layer[part] for name, layer in values.items()},
         )
 
 
-def radiance(name: str, scene: Scene, receivers: Receivers, light: Light) -> Float32:
-    """One layer (e, 3, 3) over all output triangles. Raises SceneError for a layer that does not exist."""
-    albedo = np.array([s.albedo for s in scene.surfaces])[receivers.element_surface][:, None]
-    emission = np.array([s.emission for s in scene.surfaces])[receivers.element_surface][:, None]
-    sky = light.open_sky[:, None] * np.pi * np.array(scene.sky)
-    straight = light.lamps + light.emitted + sky
+class Layers:
+    """Fitted light, colour by colour and source by source."""
 
-    def reflect(irradiance: Float64) -> Float64:
-        return albedo * irradiance[receivers.corner_vertex] / np.pi
+    def __init__(self, scene: Scene, receivers: Receivers, light: Light) -> None:
+        self._receivers = receivers
+        self._light = light
+        self._sky = light.open_sky[:, None] * np.pi * np.array(scene.sky)
+        self._straight = light.lamps + light.emitted + self._sky
+        self._colours = constant_colours(scene, receivers.element_surface)
+        self._textured = TexturedFit(scene, receivers) if any(varies(scene, o) for o in receivers.objects) else None
 
-    shape = (*receivers.corner_vertex.shape, 3)
-    layers: dict[str, Callable[[], Float64]] = {
-        "combined": lambda: emission + reflect(straight + light.reflected),
-        "light": lambda: (straight + light.reflected)[receivers.corner_vertex] / np.pi,
-        "direct": lambda: reflect(straight),
-        "indirect": lambda: reflect(light.reflected),
-        "emission": lambda: np.broadcast_to(emission, shape),
-        "sky": lambda: reflect(sky),
-        "error": lambda: np.broadcast_to(_standard_error(receivers, light)[:, :, None], shape),
-    }
-    if name not in layers:
-        raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
-    return np.ascontiguousarray(layers[name](), dtype=np.float32)
+    def radiance(self, name: str) -> Float32:
+        """One layer (e, 3, 3) over all output triangles. Raises SceneError for a layer that does not exist."""
+        light, dark = self._light, np.zeros_like(self._sky)
+        everything = self._straight + light.reflected
+        layers: dict[str, Callable[[], Float64]] = {
+            "combined": lambda: self._shown(everything, emits=True),
+            "light": lambda: everything[self._receivers.corner_vertex] / np.pi,
+            "direct": lambda: self._shown(self._straight),
+            "indirect": lambda: self._shown(light.reflected),
+            "emission": lambda: self._shown(dark, emits=True),
+            "sky": lambda: self._shown(self._sky),
+            "error": lambda: np.repeat(_standard_error(self._receivers, light)[:, :, None], 3, axis=2),
+        }
+        if name not in layers:
+            raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
+        return np.ascontiguousarray(layers[name](), dtype=np.float32)
+
+    def _shown(self, irradiance: Float64, *, emits: bool = False) -> Float64:
+        """What (e, 3, 3) the surfaces make of the irradiance (v, 3) at the vertices, with or without what they emit."""
+        shown = self._colours.albedo[:, None] * irradiance[self._receivers.corner_vertex] / np.pi
+        if emits:
+            shown = self._colours.emission[:, None] + shown
+        if self._textured is not None:
+            textured = self._textured.elements
+            shown[textured] = self._textured.shown(irradiance, emits=emits)[textured]
+        return shown
 
 
 def _standard_error(receivers: Receivers, light: Light) -> Float64:

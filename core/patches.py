@@ -12,6 +12,7 @@ import numpy as np
 
 from .scene import Float32, Float64, Int32, Scene, SceneObject
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
+from .textures import Colours, constant_colours, mean_colours, varies
 
 #: A triangle smaller than this share of a full-sized one joins its neighbours in one patch.
 _SMALL = 0.3
@@ -55,7 +56,8 @@ class Patches:
 
     corners (t, 3, 3), normals (t, 3) and area (t,) in the unit box; triangle (t,): its number in the split meshes,
     which may hold degenerate ones besides; patch (t,): the patch of each triangle; members (t,): the triangles patch by
-    patch, from first (p + 1,) on. patch_area (p,), albedo (p, 3), emission (p, 3) radiance W/(m^2 sr).
+    patch, from first (p + 1,) on. patch_area (p,), surface (p,) into Scene.surfaces, albedo (p, 3), emission (p, 3)
+    radiance W/(m^2 sr).
     """
 
     space: Space
@@ -67,6 +69,7 @@ class Patches:
     members: Int32
     first: Int32
     patch_area: Float64
+    surface: Int32
     albedo: Float32
     emission: Float32
 
@@ -124,8 +127,12 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     patch = np.unique(patch, return_inverse=True)[1].astype(np.int32)
     members = np.argsort(patch, kind="stable").astype(np.int32)
     count = int(patch.max()) + 1
-    patch_surface = np.empty(count, dtype=np.int64)
+    patch_surface = np.empty(count, dtype=np.int32)
     patch_surface[patch] = surface[solid]
+    patch_area = np.bincount(patch, weights=area[solid], minlength=count).astype(np.float64)
+    colours = constant_colours(scene, patch_surface)
+    if any(varies(scene, o) for o in scene.objects):
+        colours = _mean_colours(scene, split, solid, patch, area[solid] / patch_area[patch])
     return Patches(
         space=space,
         corners=corners[solid],
@@ -135,10 +142,22 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
         patch=patch,
         members=members,
         first=np.concatenate([[0], np.cumsum(np.bincount(patch, minlength=count))]).astype(np.int32),
-        patch_area=np.bincount(patch, weights=area[solid], minlength=count).astype(np.float64),
-        albedo=np.array([s.albedo for s in scene.surfaces], dtype=np.float32)[patch_surface],
-        emission=np.array([s.emission for s in scene.surfaces], dtype=np.float32)[patch_surface],
+        patch_area=patch_area,
+        surface=patch_surface,
+        albedo=colours.albedo.astype(np.float32),
+        emission=colours.emission.astype(np.float32),
     )
+
+
+def _mean_colours(scene: Scene, split: PatchMeshes, solid: Int64, patch: Int32, weight: Float64) -> Colours:
+    """Of each patch: means over its triangles `solid`, each counting weight (t,)."""
+    parts = [mean_colours(scene, o, m.parent, m.barycentric) for o, m in zip(scene.objects, split.meshes, strict=True)]
+
+    def of_patches(values: list[Float64]) -> Float64:
+        weighted = weight[:, None] * np.concatenate(values)[solid]
+        return np.stack([np.bincount(patch, channel) for channel in weighted.T], axis=1)
+
+    return Colours(of_patches([part.albedo for part in parts]), of_patches([part.emission for part in parts]))
 
 
 def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
@@ -151,7 +170,7 @@ def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
 
 
 def coarser_groups(patches: Patches) -> Int32:
-    """The group (p,) of each patch when about four neighbours that face the same way and look alike become one."""
+    """The group (p,) of each patch when about four neighbours that face the same way, of one surface, become one."""
     weight = patches.area / patches.patch_area[patches.patch]
     count = len(patches)
     center, facing = (
@@ -159,8 +178,7 @@ def coarser_groups(patches: Patches) -> Int32:
         for values in (patches.corners.mean(axis=1), patches.normals)
     )
     edge = 2.0 * np.sqrt(2.0 * np.median(patches.patch_area))
-    look = np.hstack([patches.albedo, patches.emission])
-    key = np.hstack([np.floor(center / edge), np.rint(facing * 1.5), look])
+    key = np.column_stack([np.floor(center / edge), np.rint(facing * 1.5), patches.surface])
     return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
 
 

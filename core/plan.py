@@ -7,6 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
+from .direct.emitters import emitting_pieces
 from .effects import MOST_PANELS, choose_effects, emitting_triangles
 from .parallel import Workers, thread_count
 from .patches import Space, make_patches, split_objects, unit_space
@@ -133,7 +134,7 @@ def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[float, fl
     """Seconds and peak MB of the bake, from how long a few rays take here and now."""
     effort, cells = unpriced.effort, unpriced.cells
     sides = 1.2 * effort.patches if unpriced.looks_around else 0
-    lights = len(scene.lamps) + min(emitting_triangles(scene), MOST_PANELS)
+    lights = len(scene.lamps) + len(emitting_pieces(scene))
     around = 2 * sides * effort.transport_rays
     if unpriced.looks_around:
         around += cells * effort.passes * effort.gather_rays

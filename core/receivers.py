@@ -11,9 +11,12 @@ from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
 from .tessellation import Int64, Tessellation, edge_for_count, edge_keys, split_triangles, triform, whole
+from .textures import Colours, constant_colours, mean_colours, varies
 
 #: Corners whose shading normals differ by less than this angle (cosine) share one value.
 _SAME_NORMAL = np.cos(np.radians(5.0))
+#: Places in a texture, and corner colours, that differ by less than this are the same, but for rounding.
+_SAME_PLACE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +26,7 @@ class Receivers:
 
     first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
     the unit box, element_shading (e, 3, 3) their corners' normals, element_surface (e,) into Scene.surfaces.
+    places (e, 3, k): what else, if given, breaks the fit where it changes over an edge.
     """
 
     space: Space
@@ -34,6 +38,7 @@ class Receivers:
     element_corners: Float64
     element_shading: Float64
     element_surface: Int32
+    places: Float64 | None = None
 
     @property
     def corner_vertex(self) -> Int32:
@@ -48,7 +53,7 @@ class Receivers:
     @cached_property
     def _fit_vertices(self) -> tuple[Int32, int]:
         # Only when someone asks: while triangles are still being split, nobody does.
-        return fit_vertices(_numbered(self.meshes), self.element_shading, self.element_surface)
+        return fit_vertices(_numbered(self.meshes), self.element_shading, self.element_surface, self.places)
 
     @cached_property
     def cell_vertex(self) -> Int32:
@@ -127,11 +132,25 @@ def split_cells(receivers: Receivers, chosen: Bool) -> tuple[Receivers, Int64]:
     return lay_out(receivers.objects, fine, receivers.space, tessellate=tessellate), np.concatenate(sources)
 
 
-def fit_vertices(triangles: Int32, normals: Float64, surface: Int32) -> tuple[Int32, int]:
+def cell_colours(scene: Scene, receivers: Receivers) -> Colours:
+    """About the mean colours of each cell, enough to weigh its errors."""
+    if not any(varies(scene, o) for o in receivers.objects):
+        return constant_colours(scene, receivers.cells.surface)
+    parts = [
+        mean_colours(scene, o, m.parent, m.barycentric, points=1)
+        for o, m in zip(receivers.objects, receivers.fine, strict=True)
+    ]
+    return Colours(np.concatenate([p.albedo for p in parts]), np.concatenate([p.emission for p in parts]))
+
+
+def fit_vertices(
+    triangles: Int32, normals: Float64, surface: Int32, places: Float64 | None = None
+) -> tuple[Int32, int]:
     """Number (t, 3) of each corner's fit vertex, and how many there are.
 
     Corners at one vertex share a value when a chain of edges joins their triangles across which neither the surface
     (t,) nor the shading normals (t, 3, 3) at the edge's ends change: hard edges and material borders do not bleed.
+    Nor may the corners' places (t, 3, k) change, where these are given.
     """
     corner = np.arange(triangles.size).reshape(-1, 3)
     here, there = shared_edges(triangles)
@@ -139,6 +158,9 @@ def fit_vertices(triangles: Int32, normals: Float64, surface: Int32) -> tuple[In
     flat = normals.reshape(-1, 3)
     for end in range(2):
         joined &= np.einsum("ek,ek->e", flat[here[:, end]], flat[there[:, end]]) > _SAME_NORMAL
+        if places is not None:
+            placed = places.reshape(triangles.size, -1)
+            joined &= np.abs(placed[here[:, end]] - placed[there[:, end]]).max(axis=1) < _SAME_PLACE
     label = _components(corner.size, here[joined].reshape(-1), there[joined].reshape(-1))
     unique, number = np.unique(label, return_inverse=True)
     return number.reshape(-1, 3).astype(np.int32), len(unique)

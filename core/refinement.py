@@ -12,10 +12,12 @@ from .accuracy import ErrorEstimate, Fitted, estimate_error, fit_halves
 from .clock import Clock
 from .parallel import Workers
 from .plan import Effort
+from .receivers import cell_colours
 from .reconstruction import Fit
 from .scene import Float64, Scene
 from .settings import Settings
 from .survey import Survey
+from .textures import Colours
 
 #: Sampling and resolution share the asked error; below this share of the resolution, sampling no longer shows.
 _SAMPLING_SHARE, _RESOLUTION_SHARE = 0.7, 0.5
@@ -93,13 +95,13 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
         reflected = values[:, :3]
         open_sky = values[:, around.sky].sum(axis=1)
         emitted = values[:, around.emitted] if around.emitted.stop > around.emitted.start else dark
-    albedo = np.array([s.albedo for s in scene.surfaces])[cells.surface]
+    colours = cell_colours(scene, receivers)
     error, cell_error = estimate_error(
         fits,
         survey.coarser / max(survey.passes, 1),
         cells.area,
-        np.sqrt(np.mean(albedo**2, axis=1)) / np.pi,
-        _mean_radiance(survey, scene, fits),
+        np.sqrt(np.mean(colours.albedo**2, axis=1)) / np.pi,
+        _mean_radiance(survey, colours, fits),
     )
     return Light(
         reflected=reflected,
@@ -116,12 +118,11 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     )
 
 
-def _mean_radiance(survey: Survey, scene: Scene, fits: list[Fitted]) -> float:
+def _mean_radiance(survey: Survey, colours: Colours, fits: list[Fitted]) -> float:
     """Mean over the receivers and the channels of the radiance, W/(m^2 sr)."""
     receivers = survey.receivers
     cells = receivers.cells
     corner = receivers.corner_vertex[cells.element]
     grey = np.sum([fitted.grey for fitted in fits], axis=0)[corner].mean(axis=1)
-    albedo = np.array([np.mean(s.albedo) for s in scene.surfaces])[cells.surface]
-    emission = np.array([np.mean(s.emission) for s in scene.surfaces])[cells.surface]
+    albedo, emission = colours.albedo.mean(axis=1), colours.emission.mean(axis=1)
     return float(cells.area @ (emission + albedo * grey / np.pi) / cells.area.sum())

@@ -7,6 +7,7 @@ reader of the add-on fills these classes in, and a test or another program can d
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -27,16 +28,55 @@ class SceneError(ValueError):
     """The scene cannot be baked as it is. The message names the thing and the remedy."""
 
 
+@dataclass(frozen=True, eq=False)
+class Texture:
+    """An image over a surface, placed by the UV coordinates of its triangles' corners.
+
+    pixels (h, w, 3) float32, row 0 at the bottom: (0, 0) is the lower left corner of the image, (1, 1) the upper right,
+    and pixel centres lie half a pixel inside. extension: what lies beyond the image: the image again, its outermost
+    pixels, black, or its mirror image. interpolation: between pixel centres, or the pixel that holds the point.
+    separate: neighbouring pixels may belong to different places on the surface, so they are never averaged.
+    """
+
+    pixels: Float32
+    extension: Literal["repeat", "extend", "clip", "mirror"] = "repeat"
+    interpolation: Literal["linear", "closest"] = "linear"
+    separate: bool = False
+
+    @cached_property
+    def levels(self) -> tuple[Float32, ...]:
+        """The pixels, then images of half the size each, down to one pixel; none smaller where pixels are separate."""
+        levels = [self.pixels]
+        while max(levels[-1].shape[:2]) > 1 and not self.separate:
+            levels.append(_halved(_halved(levels[-1]).transpose(1, 0, 2)).transpose(1, 0, 2))
+        return tuple(levels)
+
+
+def _halved(pixels: Float32) -> Float32:
+    """Half as many rows with the same mean: of two each, or with an odd number of three, the outer ones in part."""
+    count = len(pixels) // 2
+    if not count:
+        return pixels
+    if len(pixels) % 2 == 0:
+        return np.asarray((pixels[0::2] + pixels[1::2]) / 2, dtype=np.float32)
+    row = np.arange(count, dtype=np.float32)[:, None, None]
+    total = (count - row) * pixels[0:-1:2] + count * pixels[1::2] + (row + 1) * pixels[2::2]
+    return np.asarray(total / (2 * count + 1), dtype=np.float32)
+
+
 @dataclass(frozen=True)
 class Surface:
     """A diffuse material. Both sides reflect and both sides emit, as in Cycles.
 
-    albedo: reflected share per channel, 0 to 1. emission: emitted radiance per channel, W/(m^2 sr).
+    albedo: reflected share per channel, 0 to 1. emission: emitted radiance per channel, W/(m^2 sr). A texture
+    multiplies them, point by point.
     """
 
     name: str
     albedo: RGB = (0.8, 0.8, 0.8)
     emission: RGB = (0.0, 0.0, 0.0)
+    albedo_texture: Texture | None = None
+    emission_texture: Texture | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +86,8 @@ class SceneObject:
     vertices (v, 3) float64, triangles (t, 3) int32 into vertices, counter-clockwise seen from the front,
     surface (t,) int32 into Scene.surfaces. corner_normals (t, 3, 3) float32 are the shading normals of each triangle's
     corners; None shades flat. A receiver is what gets a baked attribute; all objects block and bounce light.
+    uv (t, 3, 2) float32: place of each triangle's corners in the textures of its own surface; needed where that has
+    any. colors (t, 3, 3) float32: corner colours that multiply the albedo.
     """
 
     name: str
@@ -54,6 +96,8 @@ class SceneObject:
     surface: Int32
     corner_normals: Float32 | None = None
     receives: bool = True
+    uv: Float32 | None = None
+    colors: Float32 | None = None
 
 
 @dataclass(frozen=True)

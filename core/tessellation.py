@@ -57,6 +57,11 @@ def triform(mesh: Tessellation, longest_edge: float) -> Tessellation:
     return mesh
 
 
+def quarters(corners: Float64) -> Float64:
+    """The four triangles (4, 3, k), in place or in weights, that halving the edges of one (3, k) gives."""
+    return np.concatenate([corners, (corners + corners[[1, 2, 0]]) / 2])[_FOUR]
+
+
 def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
     corners = mesh.vertices[mesh.triangles]
     edges = corners[:, [1, 2, 0]] - corners

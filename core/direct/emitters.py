@@ -1,25 +1,84 @@
-"""Emitting surfaces as lamps: each triangle a panel that shines from both sides."""
+"""Emitting surfaces as lamps: each triangle a panel that shines from both sides.
+
+A panel shines alike all over. A triangle whose emission is textured is split, where that varies most, into smaller
+panels of the mean emission each: detail finer than that shows only nearer to the surface than a panel is wide.
+"""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..effects import MOST_PANELS, emitting_triangles
 from ..patches import Space, triangle_geometry
-from ..scene import Scene
+from ..scene import Float64, Scene, SceneObject
+from ..tessellation import quarters
+from ..textures import MEAN_POINTS, even_points, point_colours, triangle_colours
 from .lamps import Light, Panel
+
+#: Panels up to which textured emission is split, and the standard deviation within them, as a share of the light, that
+#: is even enough.
+_MOST_PIECES, _EVEN = 32, 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """Part of an emitting triangle: name of its surface, weights (3, 3) of the triangle's corners at its own, corners
+    (3, 3) and area in metres, radiance (3,) W/(m^2 sr). uneven: the radiance's standard deviation within it."""
+
+    name: str
+    scene_object: SceneObject
+    triangle: int
+    weights: Float64
+    corners: Float64
+    area: float
+    radiance: Float64
+    uneven: float
 
 
 def emitting_panels(scene: Scene, space: Space) -> list[Light]:
-    """A light for each emitting triangle; none when there are so many that rays find them better."""
+    """A light for each emitting piece; none when there are so many that rays find them better."""
+    return [Panel(p.name, space.normalise(p.corners), p.radiance, two_sided=True) for p in emitting_pieces(scene)]
+
+
+def emitting_pieces(scene: Scene) -> list[Piece]:
+    """What is sampled as lamps: emitting triangles, split where their emission varies."""
     if emitting_triangles(scene) > MOST_PANELS:
         return []
-    panels: list[Light] = []
+    pieces = []
     for scene_object in scene.objects:
-        corners = space.normalise(scene_object.vertices[scene_object.triangles])
-        area = triangle_geometry(corners)[1]
-        for triangle in np.flatnonzero(area > 0):
-            surface = scene.surfaces[scene_object.surface[triangle]]
-            if max(surface.emission) > 0:
-                panels.append(Panel(surface.name, corners[triangle], np.array(surface.emission), two_sided=True))
-    return panels
+        emits = triangle_colours(scene, scene_object).emission.max(axis=1) > 0
+        pieces += [_piece(scene, scene_object, int(triangle), np.eye(3)) for triangle in np.flatnonzero(emits)]
+    pieces = [piece for piece in pieces if piece.area > 0]
+    while len(pieces) < _MOST_PIECES:
+        worst = max(pieces, key=lambda piece: piece.area * piece.uneven, default=None)
+        power = sum(piece.area * piece.radiance.mean() for piece in pieces)
+        if worst is None or sum(piece.area * piece.uneven for piece in pieces) <= _EVEN * power:
+            break
+        parts = [_piece(scene, worst.scene_object, worst.triangle, part) for part in quarters(worst.weights)]
+        place = pieces.index(worst)
+        pieces[place : place + 1] = [part for part in parts if part.radiance.max() > 0]
+    return pieces
+
+
+def _piece(scene: Scene, scene_object: SceneObject, triangle: int, weights: Float64) -> Piece:
+    corners = weights @ scene_object.vertices[scene_object.triangles[triangle]]
+    surface = scene.surfaces[scene_object.surface[triangle]]
+    parent = np.array([triangle], dtype=np.int32)
+    if surface.emission_texture is None:
+        radiance = np.array([surface.emission])
+    else:
+        every = even_points(MEAN_POINTS)
+        parts = [point_colours(scene, scene_object, parent, weights[None], p, 1.0 / MEAN_POINTS) for p in every]
+        radiance = np.concatenate([part.emission for part in parts])
+    return Piece(
+        surface.name,
+        scene_object,
+        triangle,
+        weights,
+        corners,
+        float(triangle_geometry(corners[None])[1][0]),
+        radiance.mean(axis=0),
+        float(radiance.mean(axis=1).std()),
+    )

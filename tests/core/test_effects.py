@@ -9,7 +9,7 @@ import pytest
 
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.effects import EFFECTS, choose_effects
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp, Surface
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp, Surface, Texture
 from radiosity_baker.core.settings import Settings
 
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -28,8 +28,13 @@ def everything(build) -> Scene:
     )
     glow = build.quad("glow", (-1, -1, 2), (0, 0.5, 0), (0.5, 0, 0), surface=1, receives=False)
     floor = build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
-    surfaces = (build.grey, Surface("glow", (0, 0, 0), (0, 5.0, 5.0)))
-    return Scene((floor, glow), surfaces, lamps, sky=(0.5, 0, 0.5))
+    image = Texture(np.random.default_rng(1).random((4, 4, 3), dtype=np.float32))
+    surfaces = (
+        replace(build.grey, albedo_texture=image),
+        Surface("glow", (0, 0, 0), (0, 5.0, 5.0), emission_texture=image),
+    )
+    uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], dtype=np.float32)
+    return Scene((replace(floor, uv=uv), replace(glow, uv=uv)), surfaces, lamps, sky=(0.5, 0, 0.5))
 
 
 def light(scene, **asked):
