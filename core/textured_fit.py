@@ -39,8 +39,8 @@ class TexturedFit:
     def shown(self, irradiance: Float64, *, emits: bool) -> Float64:
         """Radiance (e, 3, 3), W/(m^2 sr), of irradiance (v, 3) at the vertices of the receivers."""
         corners = irradiance[self._receivers.corner_vertex[self._receivers.cells.element]] / np.pi
-        samples = Samples(len(corners), 3)
-        every, exact = np.ones(len(corners), dtype=bool), np.zeros((len(corners), 3))
+        samples = Samples(len(corners), np.full(3, 1 / 3))
+        every, exact = np.ones(len(corners), dtype=bool), np.zeros(len(corners))
         for weights, colours in zip(self._weights, self._colours, strict=True):
             value = colours.albedo * np.einsum("ck,ckj->cj", weights, corners)
             if emits:
