@@ -78,8 +78,8 @@ class PrintedProgress(Progress):
         super().__init__()
         self._printed: tuple[str, int] | None = None
 
-    def report(self, stage: str, fraction: float, error: float | None = None) -> None:
-        super().report(stage, fraction, error)
+    def report(self, stage: str, fraction: float, error: float | None = None, until: float | None = None) -> None:
+        super().report(stage, fraction, error, until)
         step = (stage, int(10 * fraction))
         if step != self._printed:
             self._printed = step

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import threading
 import time
-from typing import ClassVar
+from collections.abc import Callable
+from typing import Any, ClassVar
 
 from ..core import bake as pipeline
 from ..core.progress import Cancelled, Progress
@@ -18,14 +19,21 @@ from ..core.settings import Settings
 
 
 class BakeJob:
-    """Start it, poll it, and take its result; all from one thread, the main one."""
+    """Start it, poll it, and take its result; all from one thread, the main one.
+
+    picture: made by the thread of the light of every pass, to show it; the light itself is kept as well, to stop there.
+    """
 
     running: ClassVar[BakeJob | None] = None
     """The bake that is under way in this Blender, if any."""
 
-    def __init__(self) -> None:
-        self.progress = Progress()
+    _leaving: ClassVar[list[threading.Thread]] = []
+
+    def __init__(self, picture: Callable[[BakeResult], Any] | None = None) -> None:
+        self.progress = Progress() if picture is None else _Watched(picture)
         self.cancelling = False
+        self.keeping = False
+        self.writing = False
         self._started = time.perf_counter()
         self._outcome: BakeResult | BaseException | None = None
         self._thread: threading.Thread | None = None
@@ -47,31 +55,63 @@ class BakeJob:
             self._outcome = problem
 
     def poll(self) -> bool:
-        """Has the thread ended?"""
-        return self._thread is not None and not self._thread.is_alive()
+        """Is there an outcome, for `result` to tell? Who stops a bake need not wait for it."""
+        return self._thread is not None and (self.cancelling or self.keeping or not self._thread.is_alive())
 
     def cancel(self) -> None:
-        """Ask the bake to stop. It does so at its next chunk of work; until then `poll` stays False."""
+        """Ask the bake to stop. It does so at its next chunk of work; whatever it still brings is dropped."""
         self.cancelling = True
         self.progress.cancel()
 
+    def keep(self) -> None:
+        """Ask the bake to stop, and take the light of its last complete pass for the result."""
+        self.keeping = self.latest is not None
+        if self.keeping:
+            self.progress.cancel()
+
+    @property
+    def latest(self) -> BakeResult | None:
+        """The light of the last complete pass, where a picture is asked for."""
+        return self.progress.latest if isinstance(self.progress, _Watched) else None
+
+    @property
+    def picture(self) -> Any:
+        """The picture of the last complete pass, or None."""
+        return self.progress.picture if isinstance(self.progress, _Watched) else None
+
     def result(self) -> BakeResult:
-        """Wait for the thread, free the desk for the next bake, and return the result or raise what the bake raised."""
-        self._close()
+        """Free the desk for the next bake, and return the result or raise what the bake raised.
+
+        Waits for the thread unless the bake was stopped.
+        """
+        self._close(wait=not (self.cancelling or self.keeping))
+        if self.cancelling:
+            raise Cancelled("The bake was cancelled; nothing was changed.")
         if isinstance(self._outcome, BakeResult):
-            if self.cancelling:
-                raise Cancelled("The bake was cancelled; nothing was changed.")
             return self._outcome
+        latest = self.latest
+        if latest is not None and self.keeping and isinstance(self._outcome, Cancelled | None):
+            latest.report.warnings.append("The bake was stopped early: bake again for the accuracy that was asked for.")
+            return latest
         raise self._outcome or RuntimeError("The bake was never started.")
 
     def stop(self) -> None:
         """Cancel, wait for the thread and forget the result: the file or the add-on is about to go away."""
         self.cancel()
-        self._close()
+        self._close(wait=True)
 
-    def _close(self) -> None:
+    @staticmethod
+    def wait_for_leaving() -> None:
+        """Wait for the threads of bakes that were stopped before their next chunk of work was done."""
+        while BakeJob._leaving:
+            BakeJob._leaving.pop().join()
+
+    def _close(self, *, wait: bool) -> None:
         if self._thread is not None:
-            self._thread.join()
+            if wait:
+                self._thread.join()
+            elif self._thread.is_alive():
+                BakeJob._leaving = [thread for thread in (*BakeJob._leaving, self._thread) if thread.is_alive()]
         if BakeJob.running is self:
             BakeJob.running = None
 
@@ -82,8 +122,23 @@ class BakeJob:
 
     @property
     def remaining(self) -> float | None:
-        """Seconds that are left if the rest goes as fast as the part so far; None while that would be a guess."""
-        fraction = self.progress.fraction
-        if fraction < 0.05:
-            return None
-        return self.elapsed * (1.0 - fraction) / fraction
+        """Seconds that are left, at first as predicted, then as the part so far went; None while neither is known."""
+        done, expected = self.progress.fraction, self.progress.expected
+        if expected is not None:
+            return (1.0 - done) * max(expected, self.elapsed)
+        return self.elapsed * (1.0 - done) / done if done >= 0.05 else None
+
+
+class _Watched(Progress):
+    """Keeps the light of the last complete pass, and its picture."""
+
+    def __init__(self, draw: Callable[[BakeResult], Any]) -> None:
+        super().__init__(watched=True)
+        self.latest: BakeResult | None = None
+        self.picture: Any = None
+        self._draw = draw
+
+    def show(self, so_far: Callable[[], BakeResult]) -> None:
+        self.check()
+        self.latest = so_far()
+        self.picture = self._draw(self.latest)

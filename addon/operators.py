@@ -1,12 +1,11 @@
 """The operators: one bake with two drivers, its cancel button, and its plan.
 
 From a script or in background `execute` blocks until the light is baked. In a window `invoke` reads the scene, leaves
-the bake to a worker thread and looks in ten times a second; all that the bake writes is written in the last of these
-ticks, so a cancelled bake has touched nothing, and one undo step takes a finished one back.
+the bake to a worker thread and looks in twenty times a second; what the bake writes takes its place in the last of
+these ticks, so a cancelled bake has touched nothing, and one undo step takes a finished one back.
 """
 
 import json
-import time
 import traceback
 from collections.abc import Callable
 from dataclasses import asdict
@@ -19,10 +18,9 @@ from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import attribute_writer, bake_scene, panels, scene_reader, viewport, wording
+from . import bake_scene, panels, scene_reader, viewport, wording
 from .job import BakeJob
-
-TICK_SECONDS = 0.1
+from .window_bake import WindowBake
 
 
 class OBJECT_OT_radiosity_bake(bpy.types.Operator):
@@ -45,23 +43,24 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         return _attempt(self, lambda: self._start(context))
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        if event.type == "ESC" and event.value == "PRESS":
-            self._job.cancel()
-            panels.redraw(context)
-            return {"RUNNING_MODAL"}
-        if event.type != "TIMER":
+        bake = WindowBake.running
+        if bake is None:
+            return {"CANCELLED"}  # The add-on has ended it already: another file is being loaded.
+        escaped = event.type == "ESC" and event.value == "PRESS"
+        if escaped:
+            bake.job.cancel()
+        elif event.type != "TIMER":
+            # What is being written must not be changed or undone meanwhile; it takes a moment only.
+            return {"RUNNING_MODAL" if bake.job.writing else "PASS_THROUGH"}
+        outcome = _attempt(self, lambda: self._advance(context, bake))
+        if outcome == {"RUNNING_MODAL"}:
             return {"PASS_THROUGH"}
-        panels.redraw(context)
-        if not self._job.poll() or not (self._job.cancelling or _can_write(context)):
-            return {"PASS_THROUGH"}
-        outcome = _attempt(self, lambda: self._finish(context))
-        self._leave()
+        _end_bake()
         return outcome
 
     def cancel(self, _context: bpy.types.Context) -> None:
         """Blender takes the operator away: the window closes, or another file is loaded."""
-        self._job.stop()
-        self._leave()
+        _end_bake()
 
     def _bake_at_once(self, context: bpy.types.Context) -> None:
         asked = context.scene.radiosity_baker
@@ -77,44 +76,21 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         self._conclude(context, result)
 
     def _start(self, context: bpy.types.Context) -> set[str]:
-        asked = context.scene.radiosity_baker
-        settings = asked.to_core()
-        # What was asked at the start counts, whatever is changed in the panel meanwhile.
-        self._result_mode, self._attribute, self._scene_name = asked.result_mode(), asked.attribute, context.scene.name
-        receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
-        attribute_writer.check_writable(
-            receivers, settings.layers, result_mode=self._result_mode, attribute=self._attribute
-        )
-        begun = time.perf_counter()
-        scene, self._sources = scene_reader.read_scene(
-            context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate
-        )
-        self._read_seconds = time.perf_counter() - begun
-        self._job = BakeJob()
-        self._job.start(scene, settings)
-        _start_ticking(context)
+        if bpy.app.background:
+            self._bake_at_once(context)
+            return {"FINISHED"}
+        WindowBake(context)
         context.window_manager.modal_handler_add(self)
         panels.redraw(context)
         return {"RUNNING_MODAL"}
 
-    def _leave(self) -> None:
-        _stop_ticking()
-        # Blender keeps finished operators for its history; what they hold would stay in memory with them.
-        del self._job, self._sources
-
-    def _finish(self, context: bpy.types.Context) -> None:
-        result = self._job.result()
-        if context.scene.name != self._scene_name:
-            raise SceneError(
-                f"The scene '{self._scene_name}' was left during the bake, so its light was not written: "
-                "stay in the scene until the bake is done."
-            )
-        begun = time.perf_counter()
-        attribute_writer.write(context, result, self._sources, result_mode=self._result_mode, attribute=self._attribute)
-        seconds = result.report.seconds
-        seconds.update(read=self._read_seconds, write=time.perf_counter() - begun)
-        seconds["total"] += seconds["read"] + seconds["write"]
+    def _advance(self, context: bpy.types.Context, bake: WindowBake) -> set[str]:
+        panels.redraw(context)
+        result = bake.advance(context)
+        if result is None:
+            return {"RUNNING_MODAL"}
         self._conclude(context, result)
+        return {"FINISHED"}
 
     def _conclude(self, context: bpy.types.Context, result: BakeResult) -> None:
         asked = context.scene.radiosity_baker
@@ -138,21 +114,36 @@ class OBJECT_OT_radiosity_plan(bpy.types.Operator):
         return _can_bake(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return _attempt(self, lambda: self._plan(context))
+        return _attempt(self, lambda: _plan(context))
 
-    def _plan(self, context: bpy.types.Context) -> None:
-        asked = context.scene.radiosity_baker
-        settings = asked.to_core()
-        receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
-        scene, _ = scene_reader.read_scene(context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
-        planned = plan(scene, settings)
-        asked.plan = json.dumps(
-            {
-                "seconds": planned.seconds,
-                "memory_mb": planned.memory_mb,
-                "effects": [asdict(effect) for effect in planned.effects],
-            }
-        )
+
+class OBJECT_OT_radiosity_switch_effect(bpy.types.Operator):
+    bl_idname = "object.radiosity_switch_effect"
+    bl_label = "Switch Effect"
+    bl_description = "Simulate this effect, or do not, whatever the scene calls for. Again leaves it to the scene"
+    bl_options: ClassVar[set[str]] = {"INTERNAL", "UNDO"}
+
+    effect: bpy.props.StringProperty(options={"HIDDEN"})
+    active: bpy.props.BoolProperty(options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        context.scene.radiosity_baker.switch_effect(self.effect, self.active)
+        return _attempt(self, lambda: _plan(context))
+
+
+def _plan(context: bpy.types.Context) -> None:
+    asked = context.scene.radiosity_baker
+    settings = asked.to_core()
+    receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
+    scene, _ = scene_reader.read_scene(context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
+    planned = plan(scene, settings)
+    asked.plan = json.dumps(
+        {
+            "seconds": planned.seconds,
+            "memory_mb": planned.memory_mb,
+            "effects": [asdict(effect) for effect in planned.effects],
+        }
+    )
 
 
 def _attempt(operator: bpy.types.Operator, action: Callable[[], set[str] | None]) -> set[str]:
@@ -173,28 +164,10 @@ def _can_bake(operator: type[bpy.types.Operator], context: bpy.types.Context) ->
     if BakeJob.running is not None:
         operator.poll_message_set("A bake is already running")
         return False
-    if not _can_write(context):
+    if context.mode != "OBJECT":
         operator.poll_message_set("Switch to Object Mode to bake")
         return False
     return True
-
-
-_timers: list[bpy.types.Timer] = []
-
-
-def _start_ticking(context: bpy.types.Context) -> None:
-    _timers.append(context.window_manager.event_timer_add(TICK_SECONDS, window=context.window))
-
-
-def _stop_ticking() -> None:
-    while _timers:
-        bpy.context.window_manager.event_timer_remove(_timers.pop())
-    panels.redraw(bpy.context)
-
-
-def _can_write(context: bpy.types.Context) -> bool:
-    """Other modes keep meshes and an undo history of their own: the result waits until they are left."""
-    return context.mode == "OBJECT"
 
 
 class OBJECT_OT_radiosity_cancel(bpy.types.Operator):
@@ -217,26 +190,57 @@ def _draw_menu(menu: bpy.types.Menu, _context: bpy.types.Context) -> None:
     menu.layout.operator(OBJECT_OT_radiosity_bake.bl_idname)
 
 
+class OBJECT_OT_radiosity_keep(bpy.types.Operator):
+    bl_idname = "object.radiosity_keep"
+    bl_label = "Stop and Keep"
+    bl_description = "Stop the bake, and keep the light as far as it has come"
+    bl_options: ClassVar[set[str]] = {"INTERNAL"}
+
+    @classmethod
+    def poll(cls, _context: bpy.types.Context) -> bool:
+        return BakeJob.running is not None and BakeJob.running.latest is not None
+
+    def execute(self, _context: bpy.types.Context) -> set[str]:
+        BakeJob.running.keep()
+        return {"FINISHED"}
+
+
 @persistent
-def _stop_bake(*_: object) -> None:
-    # Blender drops a running operator without a word when its class is unregistered, so the ticks are stopped here.
+def _end_bake(*_: object) -> None:
+    """However a bake ends. Blender drops a running operator without a word when its class is unregistered."""
     if BakeJob.running is not None:
         BakeJob.running.stop()
-        _stop_ticking()
+    if WindowBake.running is not None:
+        WindowBake.running.close()
+        panels.redraw(bpy.context)
+
+
+@persistent
+def _clear_desk(*_: object) -> None:
+    """Another file is about to be loaded, or the add-on to be disabled: no thread may outlive that."""
+    _end_bake()
+    BakeJob.wait_for_leaving()
+
+
+OPERATORS = (
+    OBJECT_OT_radiosity_bake,
+    OBJECT_OT_radiosity_cancel,
+    OBJECT_OT_radiosity_keep,
+    OBJECT_OT_radiosity_plan,
+    OBJECT_OT_radiosity_switch_effect,
+)
 
 
 def register() -> None:
-    bpy.utils.register_class(OBJECT_OT_radiosity_bake)
-    bpy.utils.register_class(OBJECT_OT_radiosity_cancel)
-    bpy.utils.register_class(OBJECT_OT_radiosity_plan)
+    for operator in OPERATORS:
+        bpy.utils.register_class(operator)
     bpy.types.VIEW3D_MT_object.append(_draw_menu)
-    bpy.app.handlers.load_pre.append(_stop_bake)
+    bpy.app.handlers.load_pre.append(_clear_desk)
 
 
 def unregister() -> None:
-    _stop_bake()
-    bpy.app.handlers.load_pre.remove(_stop_bake)
+    _clear_desk()
+    bpy.app.handlers.load_pre.remove(_clear_desk)
     bpy.types.VIEW3D_MT_object.remove(_draw_menu)
-    bpy.utils.unregister_class(OBJECT_OT_radiosity_plan)
-    bpy.utils.unregister_class(OBJECT_OT_radiosity_cancel)
-    bpy.utils.unregister_class(OBJECT_OT_radiosity_bake)
+    for operator in reversed(OPERATORS):
+        bpy.utils.unregister_class(operator)

@@ -99,8 +99,15 @@ class PlanSection:
         for effect in plan.get("effects", ()):
             column = layout.column(align=True)
             column.active = effect["active"]
-            name = effect["name"].replace("_", " ").capitalize()
-            column.label(text=name, icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT")
+            row = column.row()
+            row.alignment = "LEFT"
+            switch = row.operator(
+                "object.radiosity_switch_effect",
+                text=effect["name"].capitalize(),
+                icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT",
+                emboss=False,
+            )
+            switch.effect, switch.active = effect["name"], effect["active"]
             _label(column, context, effect["reason"], icon="BLANK1")
 
 
@@ -116,6 +123,7 @@ class AdvancedSection:
         layout.prop(settings, "seed")
         layout.prop(settings, "threads")
         layout.prop(settings, "attribute")
+        layout.prop(settings, "show_while_baking")
         layout.prop(settings, "show_when_done")
         layout.column().prop(settings, "layers", expand=True)
 
@@ -142,6 +150,7 @@ def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:
     row = layout.row(align=True)
     row.scale_y = 1.5
     row.progress(factor=job.progress.fraction, text=stage(job))
+    row.operator("object.radiosity_keep", icon="CHECKMARK", text="")
     row.operator("object.radiosity_cancel", icon="X", text="")
     layout.label(text=time_line(job), icon="TIME")
 

@@ -147,6 +147,11 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         default="Radiosity",
         maxlen=50,
     )
+    show_while_baking: BoolProperty(
+        name="Show While Baking",
+        description="Show the light in the viewport as far as it has come, pass by pass",
+        default=True,
+    )
     show_when_done: BoolProperty(
         name="Show When Done",
         description="Show the baked light in the viewport as soon as it is there",
@@ -165,6 +170,11 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         options={"HIDDEN"},
     )
 
+    overrides: StringProperty(
+        name="Effects",
+        description="Effects that are simulated, or not, whatever the scene calls for",
+        options={"HIDDEN"},
+    )
     plan: StringProperty(
         name="Plan",
         description="What the next bake would simulate, and what it would cost",
@@ -183,7 +193,19 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
             seed=self.seed,
             threads=self.threads,
             layers=tuple(layer for layer in core.LAYERS if layer == "combined" or layer in self.layers),
+            effects=self.effects(),
         )
+
+    def effects(self) -> dict[str, bool]:
+        """The effects that a person has switched on or off, by name."""
+        return _parsed(self.overrides) if self.overrides else {}
+
+    def switch_effect(self, name: str, active: bool) -> None:
+        """Switch an effect over from what it is; what was switched before is left to the scene again."""
+        effects = dict(self.effects())
+        if effects.pop(name, None) is None:
+            effects[name] = not active
+        self.overrides = json.dumps(effects)
 
     def result_mode(self) -> str:
         """The result as the attribute writer names it."""

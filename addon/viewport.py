@@ -34,6 +34,14 @@ def find_view(context: bpy.types.Context) -> bpy.types.Area | None:
     return max(views, key=lambda area: area.width * area.height, default=None)
 
 
+def redraw(context: bpy.types.Context) -> None:
+    """Draw every 3D View anew."""
+    for window in context.window_manager.windows:
+        for area in window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.tag_redraw()
+
+
 def is_shown(context: bpy.types.Context) -> bool:
     """Does the viewport at hand show the baked light, with something to go back to?"""
     area = find_view(context)

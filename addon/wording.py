@@ -51,6 +51,10 @@ def stage(job: BakeJob) -> str:
     """Where a running bake is, short enough for a bar in a narrow panel."""
     if job.cancelling:
         return "Cancelling"
+    if job.writing:
+        return "Writing"
+    if job.keeping:
+        return "Keeping"
     if job.poll():
         return "Waiting for Object Mode"
     progress = job.progress

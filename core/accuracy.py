@@ -43,9 +43,14 @@ class ErrorEstimate:
         return float(np.sqrt(self.sampling**2 + self.transport**2 + self.resolution**2))
 
     def as_dict(self) -> dict[str, float]:
+        """By name, with their total; empty where nothing is known."""
+        if not np.isfinite(self.total):
+            return {}
         parts = {"sampling": self.sampling, "transport": self.transport, "resolution": self.resolution}
         return {"total": self.total, **parts}
 
+
+UNKNOWN = ErrorEstimate(np.inf, np.inf, np.inf)
 
 #: How much the fit may weigh smoothness, from hardly to a lot.
 ALPHAS = (0.02, 0.5, 5.0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from .adaptation import Adaptation, patches_by_light
@@ -16,13 +18,13 @@ from .patches import unit_space
 from .plan import Effort, plan
 from .progress import Progress
 from .receivers import make_receivers
-from .refinement import refine
+from .refinement import Light, average_light, refine
 from .report import make_report
 from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
 from .survey import Survey, look_up
-from .transport import solve_halves
+from .transport import Transport, solve_halves
 
 
 def bake(
@@ -38,6 +40,16 @@ def bake(
         planned = plan(check_scene(scene), settings, effort)
     scene = planned.scene
     effort, sky = planned.effort, np.array(scene.sky)
+    clock.progress.expected = planned.seconds
+
+    def finish(halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:
+        objects = tuple(baked_objects(scene, survey.receivers, light, settings.layers))
+        report = make_report(scene, settings, planned, clock, workers.threads, patches, halves, survey, light, objects)
+        return BakeResult(objects, report)
+
+    def show(halves: tuple[Transport, ...], survey: Survey, light: Light) -> None:
+        clock.progress.show(lambda: finish(halves, survey, light))
+
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
             space = unit_space(scene)
@@ -45,7 +57,11 @@ def bake(
             lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
             patches, visibility = patches_by_light(scene, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
-        with clock.stage("transport", 0.1):
+        if clock.progress.watched:
+            first = Survey(receivers, direct_light, None, effort, settings.seed, workers)
+            first.run_pass()
+            show((), first, average_light(first))
+        with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
@@ -53,10 +69,6 @@ def bake(
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
             receivers = adaptation.refine_receivers(receivers, limit, effort.error)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
-        light = refine(survey, scene, settings, effort, workers, clock)
-    with clock.stage("layers", 0.97):
-        objects = tuple(baked_objects(scene, receivers, light, settings.layers))
-    return BakeResult(
-        objects,
-        make_report(scene, settings, planned, clock, workers.threads, patches, halves, survey, light, objects),
-    )
+        light = refine(survey, scene, settings, effort, workers, clock, partial(show, halves, survey))
+        with clock.stage("layers", 0.97):
+            return finish(halves, survey, light)

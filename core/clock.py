@@ -18,9 +18,11 @@ class Clock:
         self._begun = perf_counter()
 
     @contextmanager
-    def stage(self, name: str, fraction: float, error: float | None = None) -> Iterator[None]:
-        """Count the time inside as that of the stage `name`, which begins at `fraction` of the bake."""
-        self.progress.report(name, fraction, error)
+    def stage(
+        self, name: str, fraction: float, error: float | None = None, until: float | None = None
+    ) -> Iterator[None]:
+        """Count the time inside as that of the stage `name`, which goes from `fraction` of the bake to `until`."""
+        self.progress.report(name, fraction, error, until)
         begun = perf_counter()
         try:
             yield

@@ -39,6 +39,8 @@ class Workers:
 
         def work(number: int) -> Result:
             self.progress.check()
-            return function(number, slice(number * chunk, min((number + 1) * chunk, count)))
+            done = function(number, slice(number * chunk, min((number + 1) * chunk, count)))
+            self.progress.step()
+            return done
 
         return self._pool.map(work, range(-(-count // chunk)))

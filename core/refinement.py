@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from math import ceil
 from time import perf_counter
 
 import numpy as np
 
-from .accuracy import ErrorEstimate, Fitted, estimate_error, fit_halves
+from .accuracy import UNKNOWN, ErrorEstimate, Fitted, estimate_error, fit_halves
 from .clock import Clock
 from .parallel import Workers
 from .plan import Effort
 from .receivers import cell_colours
-from .reconstruction import Fit
+from .reconstruction import Fit, Samples
 from .scene import Float64, Scene
 from .settings import Settings
 from .survey import Survey
@@ -42,13 +43,24 @@ class Light:
     vertices: dict[str, int]
 
 
-def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, workers: Workers, clock: Clock) -> Light:
-    """Passes until the estimated error, or the clock, says so."""
+def refine(
+    survey: Survey,
+    scene: Scene,
+    settings: Settings,
+    effort: Effort,
+    workers: Workers,
+    clock: Clock,
+    show: Callable[[Light], None],
+) -> Light:
+    """Passes until the estimated error, or the clock, says so. show: takes the light after each pass, if watched."""
     begun = perf_counter()
     with clock.stage("gather", 0.3):
         for number in range(effort.passes):
-            clock.progress.report("gather", 0.3 + 0.4 * number / effort.passes)
+            begin, end = (0.3 + 0.4 * n / effort.passes for n in (number, number + 1))
+            clock.progress.report("gather", begin, until=end)
             survey.run_pass()
+            if clock.progress.watched:
+                show(average_light(survey))
         survey.refine_boundaries(effort.boundary_passes)
     seconds_per_pass = (perf_counter() - begun) / effort.passes
     for round_number in range(_MOST_ROUNDS):
@@ -56,6 +68,8 @@ def refine(survey: Survey, scene: Scene, settings: Settings, effort: Effort, wor
         with clock.stage("fit", 0.75 + 0.05 * round_number):
             light = fit_light(survey, scene, workers)
         seconds_to_fit = perf_counter() - begun
+        if clock.progress.watched:
+            show(light)
         more = _passes_wanted(survey, light.error, settings)
         if settings.seconds is not None:
             left = settings.seconds - clock.elapsed - seconds_to_fit
@@ -88,13 +102,6 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     fit = Fit(receivers, survey.valid_samples, survey.invalid)
     sampled = [survey.direct, survey.indirect] if around else [survey.direct]
     fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area), len(sampled), 1))
-    dark = np.zeros((receivers.vertices, 3))
-    reflected, open_sky, emitted = dark, dark[:, 0], dark
-    if around:
-        values = fits[1].values
-        reflected = values[:, :3]
-        open_sky = values[:, around.sky].sum(axis=1)
-        emitted = values[:, around.emitted] if around.emitted.stop > around.emitted.start else dark
     colours = cell_colours(scene, receivers)
     error, cell_error = estimate_error(
         fits,
@@ -103,18 +110,53 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
         np.sqrt(np.mean(colours.albedo**2, axis=1)) / np.pi,
         _mean_radiance(survey, colours, fits),
     )
+    vertices = {
+        "all": receivers.vertices,
+        "filled": int(np.count_nonzero(fit.filled)),
+        "hidden": int(np.count_nonzero(fit.hidden & ~fit.filled)),
+    }
+    return _light(survey, [f.values for f in fits], error, cell_error, vertices)
+
+
+def average_light(survey: Survey) -> Light:
+    """The light so far, each vertex the mean of the samples around it: quick and rough, and with nothing known of its
+    error."""
+    cells = survey.receivers.cells
+    corner = survey.receivers.corner_vertex[cells.element].ravel()
+    count = survey.receivers.vertices
+
+    def mean(halves: list[Samples]) -> Float64:
+        total = halves[0] + halves[1]
+        m = total.moments
+        share = (m[:, :3] + m[:, [3, 3, 4]] + m[:, [4, 5, 5]]) * cells.area[:, None]
+        weight = np.maximum(np.bincount(corner, share.ravel(), count), np.finfo(float).tiny)
+        light = total.light * cells.area[:, None, None]
+        channels = [np.bincount(corner, light[..., k].ravel(), count) / weight for k in range(light.shape[2])]
+        return np.stack(channels, axis=1)
+
+    sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
+    return _light(survey, [mean(halves) for halves in sampled], UNKNOWN, np.zeros(len(cells)), {"all": count})
+
+
+def _light(
+    survey: Survey, values: list[Float64], error: ErrorEstimate, cell_error: Float64, vertices: dict[str, int]
+) -> Light:
+    """Vertex values (v, channels) of direct and, if any, indirect light, by where it came from."""
+    around = survey.surroundings
+    dark = np.zeros((survey.receivers.vertices, 3))
+    reflected, open_sky, emitted = dark, dark[:, 0], dark
+    if around:
+        reflected = values[1][:, :3]
+        open_sky = values[1][:, around.sky].sum(axis=1)
+        emitted = values[1][:, around.emitted] if around.emitted.stop > around.emitted.start else dark
     return Light(
         reflected=reflected,
         open_sky=open_sky,
         emitted=emitted,
-        lamps=fits[0].values[:, :3],
+        lamps=values[0][:, :3],
         error=error,
         cell_error=cell_error,
-        vertices={
-            "all": receivers.vertices,
-            "filled": int(np.count_nonzero(fit.filled)),
-            "hidden": int(np.count_nonzero(fit.hidden & ~fit.filled)),
-        },
+        vertices=vertices,
     )
 
 

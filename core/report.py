@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import sys
 
+import numpy as np
+
 from .clock import Clock
 from .patches import Patches
 from .plan import Plan
@@ -59,7 +61,7 @@ def _mean_energy(halves: tuple[Transport, ...]) -> dict[str, float]:
 
 def _warnings(settings: Settings, light: Light) -> list[str]:
     warnings = []
-    if settings.error is not None and light.error.total > 1.1 * settings.error:
+    if settings.error is not None and np.inf > light.error.total > 1.1 * settings.error:
         cause = max(("sampling", "transport", "resolution"), key=lambda name: getattr(light.error, name))
         remedy = {
             "sampling": "allow more time",

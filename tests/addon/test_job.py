@@ -60,7 +60,51 @@ def test_cancel_ends_the_thread(start):
     assert job.cancelling
     with pytest.raises(Cancelled):
         job.result()
+    BakeJob.wait_for_leaving()
     assert not threads()
+
+
+def test_who_cancels_need_not_wait(start):
+    go_on = threading.Event()
+    job = start(lambda *_: go_on.wait() and BakeResult((), Report()))
+    job.cancel()
+    assert job.poll()
+    with pytest.raises(Cancelled):
+        job.result()
+    assert BakeJob.running is None
+    assert threads()
+    go_on.set()
+    BakeJob.wait_for_leaving()
+    assert not threads()
+
+
+def test_kept_light_is_that_of_the_last_complete_pass(monkeypatch):
+    passes = [BakeResult((), Report(patches=number)) for number in range(3)]
+    at_work = threading.Event()
+
+    def bake(_scene, _settings, progress):
+        for each in passes:
+            progress.show(lambda each=each: each)
+        at_work.set()
+        while True:
+            progress.report("gather", 0.5)
+
+    monkeypatch.setattr(module.pipeline, "bake", bake)
+    job = BakeJob(lambda result: result.report.patches)
+    job.start(NOTHING, Settings())
+    at_work.wait()
+    assert job.picture == 2
+    job.keep()
+    assert job.result() is passes[-1]
+    assert "stopped early" in passes[-1].report.warnings[0]
+    BakeJob.wait_for_leaving()
+
+
+def test_nothing_to_keep_does_not_stop_the_bake(start):
+    job = start(bake_until_cancelled)
+    job.keep()
+    assert not job.keeping
+    assert not job.poll()
 
 
 def test_a_result_that_comes_after_the_cancel_is_dropped(start):

@@ -49,6 +49,7 @@ def test_no_setting_of_the_core_is_out_of_reach(asked):
     changed = {"goal": "SECONDS", "result": "KEEP", "density": "SIZE", "triangles": 1, "estimator": "centroid"}
     for name, value in (changed | {"seed": 1, "threads": 1, "layers": {"sky"}}).items():
         setattr(asked, name, value)
+    asked.switch_effect("sky", True)
     ours, default = asked.to_core(), Settings()
     same = [field.name for field in fields(Settings) if getattr(ours, field.name) == getattr(default, field.name)]
     assert same == []

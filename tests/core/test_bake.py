@@ -371,11 +371,11 @@ class Watched(Progress):
         self.reports: list[tuple[str, float]] = []
         self.patience = patience
 
-    def report(self, stage, fraction, error=None):
+    def report(self, stage, fraction, error=None, until=None):
         self.reports.append((stage, fraction))
         if len(self.reports) > self.patience:
             self.cancel()
-        super().report(stage, fraction, error)
+        super().report(stage, fraction, error, until)
 
 
 def test_progress_rises_from_nothing_to_the_end(terrace):
