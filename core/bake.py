@@ -14,7 +14,7 @@ from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .layers import baked_objects
 from .parallel import Workers
-from .patches import unit_space
+from .patches import Patches, make_patches, split_objects, unit_space
 from .plan import Effort, plan
 from .progress import Progress
 from .receivers import make_receivers
@@ -25,6 +25,7 @@ from .scene import Scene
 from .settings import Settings
 from .survey import Survey, look_up
 from .transport import Transport, solve_halves
+from .visibility import Visibility
 
 
 def bake(
@@ -42,25 +43,28 @@ def bake(
     effort, sky = planned.effort, np.array(scene.sky)
     clock.progress.expected = planned.seconds
 
-    def finish(halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:
+    def finish(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:
         objects = tuple(baked_objects(scene, survey.receivers, light, settings.layers))
         report = make_report(scene, settings, planned, clock, workers.threads, patches, halves, survey, light, objects)
         return BakeResult(objects, report)
 
-    def show(halves: tuple[Transport, ...], survey: Survey, light: Light) -> None:
-        clock.progress.show(lambda: finish(halves, survey, light))
+    def show(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> None:
+        clock.progress.show(lambda: finish(patches, halves, survey, light))
 
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
             space = unit_space(scene)
             receivers = make_receivers(scene, space, settings, effort.triangles)
             lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
+            if clock.progress.watched:
+                # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
+                coarse = make_patches(scene, space, split_objects(scene, 1))
+                straight = DirectLight(lights, Visibility(coarse.corners), settings.seed)
+                first = Survey(receivers, straight, None, effort, settings.seed, workers)
+                first.run_pass()
+                show(coarse, (), first, average_light(first))
             patches, visibility = patches_by_light(scene, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
-        if clock.progress.watched:
-            first = Survey(receivers, direct_light, None, effort, settings.seed, workers)
-            first.run_pass()
-            show((), first, average_light(first))
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
@@ -69,6 +73,6 @@ def bake(
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
             receivers = adaptation.refine_receivers(receivers, limit, effort.error)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
-        light = refine(survey, scene, settings, effort, workers, clock, partial(show, halves, survey))
+        light = refine(survey, scene, settings, effort, workers, clock, partial(show, patches, halves, survey))
         with clock.stage("layers", 0.97):
-            return finish(halves, survey, light)
+            return finish(patches, halves, survey, light)

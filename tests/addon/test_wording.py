@@ -39,12 +39,16 @@ def test_ledger_that_does_not_close_says_so():
         ({"stage": "gather", "fraction": 0.434}, "Gather 43 %"),
         ({"stage": "gather", "fraction": 0.5, "error": 0.0213}, "Gather 50 %, error 2.1 %"),
         ({"stage": "gather", "cancelling": True}, "Cancelling"),
+        ({"stage": "gather", "keeping": True}, "Keeping"),
+        ({"stage": "layers", "writing": True}, "Writing"),
         ({"stage": "layers", "ended": True}, "Waiting for Object Mode"),
     ],
 )
 def test_stage_of_a_running_bake(job, said):
     progress = SimpleNamespace(**{"stage": "", "fraction": 0.0, "error": None} | job)
-    running = SimpleNamespace(progress=progress, cancelling="cancelling" in job, poll=lambda: "ended" in job)
+    running = SimpleNamespace(progress=progress, poll=lambda: "ended" in job)
+    for state in ("cancelling", "keeping", "writing"):
+        setattr(running, state, state in job)
     assert wording.stage(running) == said
 
 
