@@ -56,12 +56,11 @@ class DirectLight:
             free, weights, gains = self._look(light, along[:, :, lit], origins[lit], unit)
             cast += free.size
             arrived = weights * free if gains is None else weights * gains * free
-            visible = _ratio(arrived.sum(axis=0), weights.sum(axis=0))
-            irradiance[lit] += (share[lit] * visible)[:, None] * light.color
+            shape = (halves, per_half, len(lit))
+            seen = _seen(share[lit], weights.reshape(shape).mean(axis=1), arrived.reshape(shape).mean(axis=1))
+            irradiance[lit] += seen.mean(axis=0)[:, None] * light.color
             if halves == 2:
-                shape = (halves, per_half, len(lit))
-                first, second = _ratio(arrived.reshape(shape).sum(axis=1), weights.reshape(shape).sum(axis=1))
-                variance[lit] += ((share[lit] * (first - second))[:, None] * light.color) ** 2 / 4.0
+                variance[lit] += ((seen[0] - seen[1])[:, None] * light.color) ** 2 / 4.0
             whole = free.all(axis=0)
             signature[lit] += np.where(whole, name, 0)
             partly[lit] |= free.any(axis=0) & ~whole
@@ -77,12 +76,10 @@ class DirectLight:
         for no ray is cast along them.
         """
         points, normals, shading = along
-        towards, depth = light.aim(points, unit)
-        squared = (towards * towards).sum(axis=0)
-        inverse = 1 / np.sqrt(np.maximum(squared, np.float32(1e-30)))
-        cosine = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * inverse
-        weights = cosine * depth * inverse**3
-        gains = light.gain(towards, inverse)
+        ways = light.aim(points, unit)
+        towards = ways.towards
+        weights = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
+        gains = light.gain(ways)
         free = weights == 0 if gains is None else weights * gains == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
         above = (towards * normals[:, None]).sum(axis=0) > 0
@@ -92,10 +89,19 @@ class DirectLight:
         return free, weights, gains
 
 
-def _ratio(arrived: Float32, total: Float32) -> Float32:
-    """Share of the light that arrives. No way counts where only a sliver of the light shows, or from inside a lamp:
-    then nothing is in the way."""
-    return np.divide(arrived, total, out=np.ones_like(total), where=total > 0)
+def _seen(share: Float64, weights: Float32, arrived: Float32) -> Float64:
+    """How much of a light is seen, (h, n), by each half of the ways: mean weights (h, n), of which so much arrived.
+
+    share (n,) is what the weights are on average, and the difference corrects what arrived, as far as the light is
+    free: exactly the share where nothing is in the way, and exactly nothing where everything is. How far it is free the
+    other half tells (control variates; A. Owen, Monte Carlo theory, methods and examples, chapter 8.9), so the answer
+    is right on average, which the ratio of the two sums is not. A single way has no other half.
+    """
+    free = np.divide(arrived, weights, out=np.ones_like(weights), where=weights > 0)
+    if len(free) == 1:
+        return share * free
+    other = free[::-1].astype(np.float64)
+    return other * share + (arrived - other * weights)
 
 
 def _lattices(halves: int, count: int, points: int, rng: np.random.Generator) -> Float32:

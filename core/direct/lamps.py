@@ -2,16 +2,15 @@
 
 Every lamp answers three questions, for points in the unit box:
 - `share(points, normals)`: how much of its light arrives, (n,), as if it shone evenly: irradiance = share * colour;
-- `aim(points, unit)`: ways from the points to places spread over the lamp, and the lamp's depth along them;
-- `gain(towards, inverse)`: how much of an even lamp's light it really sends along these ways, or None for all of it.
-A way of direction w counts cos(receiver, w) * cos(lamp, w) / length^2, the cosine at the lamp being depth / length.
-Irradiance is colour * share * (sum of count * gain of the free ways / sum of all counts): exact wherever no way is
-blocked and the lamp shines evenly. The arrays of ways have components and samples first, (3, r, n), in single
-precision: numpy then runs along the points.
+- `aim(points, unit)`: ways from the points to places spread over the lamp, and how much of its sky each stands for;
+- `gain(ways)`: how much of an even lamp's light it really sends along these ways, or None for all of it.
+The mean over all ways of cos(receiver, way) * solid is the share, where nothing is in the way. The arrays of ways have
+components and samples first, (3, r, n), in single precision: numpy then runs along the points.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
@@ -21,6 +20,7 @@ from ..form_factors.polygon import polygon_irradiance
 from ..patches import Space
 from ..scene import AreaLamp, Float32, Float64, Lamp, PointLamp, SpotLamp, SunLamp
 from .cap import cap_irradiance
+from .solid_angle import rectangle_places, triangle_directions
 
 Real = TypeVar("Real", np.float32, np.float64)
 
@@ -28,6 +28,20 @@ Real = TypeVar("Real", np.float32, np.float64)
 _ELLIPSE_CORNERS = 32
 #: How far away the targets of a sun are, in half extents of the scene: beyond every occluder.
 _BEYOND = np.float32(8)
+#: Nearer than this many diameters, places on a flat lamp are spread over its solid angle, farther over its area.
+_NEAR = 0.75
+#: Solid angles below this cancel; they belong to lamps that are seen edge-on.
+_SLIVER = 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Ways from points to places on a lamp. towards (3, r, n), from end to end; inverse (r, n) of their lengths; solid
+    (r, n): the sky that each stands for, in the unit of the lamp's share."""
+
+    towards: Float32
+    inverse: Float32
+    solid: Float32
 
 
 class Light(Protocol):
@@ -39,9 +53,9 @@ class Light(Protocol):
 
     def share(self, points: Float64, normals: Float64) -> Float64: ...
 
-    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]: ...
+    def aim(self, points: Float32, unit: Float32) -> Ways: ...
 
-    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None: ...
+    def gain(self, ways: Ways) -> Float32 | None: ...
 
 
 def place(lamp: Lamp, space: Space) -> Light:
@@ -55,6 +69,12 @@ def place(lamp: Lamp, space: Space) -> Light:
             return Spot(lamp, space)
         case PointLamp():
             return Ball(lamp, space)
+
+
+def _spread(towards: Float32, depth: Float32, scale: Float32 | float) -> Ways:
+    """Ways to places spread evenly over a flat lamp. depth (r, n): of the lamp along them; scale: its area."""
+    inverse = 1 / np.sqrt(np.maximum((towards * towards).sum(axis=0), np.float32(1e-30)))
+    return Ways(towards, inverse, depth * inverse**3 * np.float32(scale))
 
 
 def frame(axis: Float32) -> tuple[Float32, Float32]:
@@ -96,19 +116,19 @@ class Ball:
         sine = np.where(height > 0, radius / np.sqrt(radius**2 + height**2), 2.0)
         return cap_irradiance(cosine, sine) / self.radius**2
 
-    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
+    def aim(self, points: Float32, unit: Float32) -> Ways:
         towards = self.position.astype(np.float32)[:, None] - points
         distance = np.sqrt((towards * towards).sum(axis=0))
         if not self.sized:
-            return towards[:, None], distance[None]
+            return _spread(towards[:, None], distance[None], 1)
         axis = towards / np.maximum(distance, np.float32(1e-30))
         radius, height = self._silhouette(distance)
         first, second = frame(axis)
         x, y = disc(unit)
-        spread = (x * radius) * first[:, None] + (y * radius) * second[:, None]
-        return (axis * height)[:, None] + spread, height[None]
+        aside = (x * radius) * first[:, None] + (y * radius) * second[:, None]
+        return _spread((axis * height)[:, None] + aside, height[None], (radius / np.float32(self.radius)) ** 2)
 
-    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+    def gain(self, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
     def _silhouette(self, distance: NDArray[Real]) -> tuple[NDArray[Real], NDArray[Real]]:
@@ -145,9 +165,9 @@ class Spot(Ball):
         share[reached] = super().share(points[reached], normals[reached])
         return share
 
-    def gain(self, towards: Float32, inverse: Float32) -> Float32:  # noqa: ARG002 - lengths are the local ones
+    def gain(self, ways: Ways) -> Float32:
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
-        local = np.tensordot(self.inverse_axes.T.astype(np.float32), towards, axes=1)
+        local = np.tensordot(self.inverse_axes.T.astype(np.float32), ways.towards, axes=1)
         depth = local[2] / np.sqrt(np.maximum((local * local).sum(axis=0), np.float32(1e-30)))
         step = np.clip((depth - np.float32(self.cosine)) / np.float32(self.softness), 0, 1)
         return step * step * (3 - 2 * step)
@@ -170,25 +190,38 @@ class Sun:
         sine = self.tangent / np.sqrt(1.0 + self.tangent**2)
         return cap_irradiance(cosine, np.full(len(points), sine)) / sine**2
 
-    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
+    def aim(self, points: Float32, unit: Float32) -> Ways:
         axis = self.axis.astype(np.float32)[:, None]
         depth = np.full((1, points.shape[1]), _BEYOND, dtype=np.float32)
         if not self.sized:
-            return np.broadcast_to(_BEYOND * axis[:, None], (3, 1, points.shape[1])), depth
+            towards = np.broadcast_to(_BEYOND * axis[:, None], (3, 1, points.shape[1]))
+            return _spread(towards, depth, float(_BEYOND) ** 2)
         first, second = frame(axis)
         x, y = disc(unit)
         reach = np.float32(_BEYOND * self.tangent)
-        return _BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None]), depth
+        towards = _BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None])
+        return _spread(towards, depth, float(_BEYOND) ** 2 * (1 + self.tangent**2))
 
-    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+    def gain(self, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
 
 class Panel:
-    """A flat convex polygon that emits alike over its area: an area lamp, or a triangle of an emitting surface."""
+    """A flat convex polygon that emits alike over its area: an area lamp, or a triangle of an emitting surface.
+
+    axes: origin and two axes of the coordinates that spread the unit square over it; round: it stands for the ellipse
+    about the origin with these half axes.
+    """
 
     def __init__(
-        self, name: str, corners: Float64, radiance: Float64, *, two_sided: bool, spread: float = np.pi
+        self,
+        name: str,
+        corners: Float64,
+        radiance: Float64,
+        *,
+        two_sided: bool,
+        spread: float = np.pi,
+        ellipse: tuple[Float64, Float64, Float64] | None = None,
     ) -> None:
         self.name = name
         self.corners = corners
@@ -196,53 +229,93 @@ class Panel:
         self.two_sided = two_sided
         self.half_spread = spread / 2
         self.sized = True
-        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
-        self.normal = normal / np.linalg.norm(normal)
+        fan = np.cross(corners[1:-1] - corners[0], corners[2:] - corners[0]).sum(axis=0)
+        self.area = float(np.linalg.norm(fan)) / 2
+        self.normal = fan / np.linalg.norm(fan)
+        self.round = ellipse is not None
+        self.axes = ellipse or (corners[0], corners[1] - corners[0], corners[-1] - corners[0])
+        self._center = corners.mean(axis=0)
+        self._reach = _NEAR * 2 * float(np.linalg.norm(corners - self._center, axis=1).max())
+        first, second = self.axes[1:]
+        square = abs(first @ second) < 1e-6 * np.linalg.norm(first) * np.linalg.norm(second)
+        self._rectangular = len(corners) >= 4 and square
 
     @classmethod
     def from_area_lamp(cls, lamp: AreaLamp, space: Space) -> Panel:
         half_u, half_v = np.array(lamp.half_u) / space.metres, np.array(lamp.half_v) / space.metres
+        center, ellipse = space.normalise(np.array(lamp.center)), None
         if lamp.shape == "rectangle":
             outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
         else:
             turn = np.arange(_ELLIPSE_CORNERS) * 2 * np.pi / _ELLIPSE_CORNERS
             grow = np.sqrt(2 * np.pi / (_ELLIPSE_CORNERS * np.sin(2 * np.pi / _ELLIPSE_CORNERS)))
             outline = grow * np.column_stack([np.cos(turn), np.sin(turn)])
+            ellipse = (center, half_u, half_v)
         if np.cross(half_u, half_v) @ np.array(lamp.normal) < 0:
             outline = outline[::-1]
-        corners = space.normalise(np.array(lamp.center)) + outline @ np.stack([half_u, half_v])
-        return cls(lamp.name, corners, np.array(lamp.radiance), two_sided=False, spread=lamp.spread)
+        corners = center + outline @ np.stack([half_u, half_v])
+        radiance = np.array(lamp.radiance)
+        return cls(lamp.name, corners, radiance, two_sided=False, spread=lamp.spread, ellipse=ellipse)
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         return polygon_irradiance(points, normals, self.corners, two_sided=self.two_sided)
 
-    def aim(self, points: Float32, unit: Float32) -> tuple[Float32, Float32]:
-        origin, first, second = (v.astype(np.float32)[:, None, None] for v in self._axes())
+    def aim(self, points: Float32, unit: Float32) -> Ways:
+        origin, first, second = (v.astype(np.float32)[:, None, None] for v in self.axes)
         x, y = self._coordinates(unit)
         towards = origin + x * first + y * second - points[:, None]
         depth = -np.tensordot(self.normal.astype(np.float32), towards, axes=1)
-        return towards, np.abs(depth) if self.two_sided else np.maximum(depth, 0)
+        ways = _spread(towards, np.abs(depth) if self.two_sided else np.maximum(depth, 0), self.area / np.pi)
+        away = points - self._center.astype(np.float32)[:, None]
+        near = np.flatnonzero((away * away).sum(axis=0) < self._reach**2)
+        if len(near) and (self._rectangular or len(self.corners) == 3):
+            self._aim_nearby(ways, near, points[:, near].astype(np.float64), unit[:, :, near].astype(np.float64))
+        return ways
 
-    def gain(self, towards: Float32, inverse: Float32) -> Float32 | None:
+    def _aim_nearby(self, ways: Ways, near: np.ndarray, points: Float64, unit: Float64) -> None:
+        """Replace the ways from the nearby points by such as are spread over the lamp's solid angle."""
+        depth = (points - self._center[:, None]).T @ self.normal
+        front = np.abs(depth) > 1e-9 if self.two_sided else depth > 1e-9
+        near, points, unit, depth = near[front], points[:, front], unit[:, :, front], depth[front]
+        if self._rectangular:
+            towards, solid, on_lamp = self._over_rectangle(points, depth, unit)
+        else:
+            directions, solid = triangle_directions(self.corners[:, :, None] - points, unit)
+            slant = -np.tensordot(self.normal, directions, axes=1)
+            towards = directions * (depth / np.where(slant == 0, 1e-30, slant))
+            on_lamp = np.ones(towards.shape[1:], dtype=bool)
+        usable = solid > _SLIVER
+        near, towards = near[usable], towards[:, :, usable]
+        ways.towards[:, :, near] = towards
+        ways.inverse[:, near] = 1 / np.sqrt((towards * towards).sum(axis=0))
+        ways.solid[:, near] = (on_lamp * solid / np.pi)[:, usable]
+
+    def _over_rectangle(self, points: Float64, depth: Float64, unit: Float64) -> tuple[Float64, Float64, np.ndarray]:
+        """Ways (3, r, n) to places of the rectangle around the lamp, its solid angle (n,), which (r, n) lie on it."""
+        lengths = [np.linalg.norm(axis) for axis in self.axes[1:]]
+        first, second = (axis / length for axis, length in zip(self.axes[1:], lengths, strict=True))
+        from_origin = np.stack([first, second]) @ (self.axes[0][:, None] - points)
+        size = np.array(lengths)[:, None]
+        low = from_origin - size if self.round else from_origin
+        places, solid = rectangle_places(low, from_origin + size, np.abs(depth), unit)
+        x, y = places
+        across = self.normal[:, None] * -depth
+        towards = first[:, None, None] * x + second[:, None, None] * y + across[:, None]
+        offset = (places - from_origin[:, None]) / size[:, None]
+        return towards, solid, (offset * offset).sum(axis=0) <= 1 if self.round else np.ones_like(x, dtype=bool)
+
+    def gain(self, ways: Ways) -> Float32 | None:
         """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
         (tan h - tan a) / (tan h - h), as Cycles does it, a being the angle off the axis and h half the spread."""
         if self.half_spread >= np.pi / 2 - 1e-6:
             return None
-        cosine = np.abs(np.tensordot(self.normal.astype(np.float32), towards, axes=1)) * inverse
+        cosine = np.abs(np.tensordot(self.normal.astype(np.float32), ways.towards, axes=1)) * ways.inverse
         edge = np.tan(self.half_spread)
         tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / np.maximum(cosine, 1e-9)
         return np.maximum(edge - tangent, 0) / (edge - self.half_spread)
-
-    def _axes(self) -> tuple[Float64, Float64, Float64]:
-        """Origin and two axes of the coordinates that spread the unit square over the polygon."""
-        corners = self.corners
-        if len(corners) <= 4:
-            return corners[0], corners[1] - corners[0], corners[-1] - corners[0]
-        center = corners.mean(axis=0)
-        return center, corners[0] - center, corners[len(corners) // 4] - center
 
     def _coordinates(self, unit: Float32) -> tuple[Float32, Float32]:
         if len(self.corners) == 3:
             root = np.sqrt(unit[0])
             return root * (1 - unit[1]), root * unit[1]
-        return (unit[0], unit[1]) if len(self.corners) == 4 else disc(unit)
+        return disc(unit) if self.round else (unit[0], unit[1])
