@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 
-import numpy as np
-
 from .adaptation import Adaptation, patches_by_light
 from .check import check_scene
 from .clock import Clock
@@ -23,6 +21,7 @@ from .report import make_report
 from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
+from .sky import Sky
 from .survey import Survey, look_up
 from .transport import Transport, solve_halves
 from .visibility import Visibility
@@ -40,7 +39,7 @@ def bake(
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
     scene = planned.scene
-    effort, sky = planned.effort, np.array(scene.sky)
+    effort, sky = planned.effort, Sky.of(scene.sky)
     clock.progress.expected = planned.seconds
 
     def finish(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .scene import ALBEDO_LIMIT, Scene, SceneError, SceneObject, Surface
+from .scene import ALBEDO_LIMIT, Scene, SceneError, SceneObject, SkyMap, Surface
 
 #: Beyond this many half extents from the origin, single precision shows in the result.
 _FAR = 1e5
@@ -24,6 +24,9 @@ def check_scene(scene: Scene) -> Scene:
     for lamp in scene.lamps:
         if not np.isfinite(np.concatenate([np.ravel(v) for v in vars(lamp).values() if not isinstance(v, str)])).all():
             raise SceneError(f"Lamp '{lamp.name}' has a value that is not a number: check its transform and its power.")
+    sky = scene.sky.pixels if isinstance(scene.sky, SkyMap) else np.array(scene.sky)
+    if not np.isfinite(sky).all() or sky.min() < 0:
+        raise SceneError("The sky has a colour that is negative or not a number: check the nodes of the world.")
     extent = max(float(np.max(np.ptp(o.vertices, axis=0))) for o in objects)
     away = max(float(np.abs(o.vertices).max()) for o in objects)
     if away > _FAR * max(extent, 1e-30):

@@ -16,7 +16,7 @@ import numpy as np
 
 from .patches import triangle_geometry
 from .result import Effect
-from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp
+from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp
 from .settings import Settings
 from .textures import triangle_colours, varying_albedo, varying_emission
 
@@ -86,7 +86,8 @@ def emitting_surfaces(scene: Scene, _: Settings) -> Effect:
 
 
 def sky(scene: Scene, _: Settings) -> Effect:
-    shines = max(scene.sky) > 0
+    light = scene.sky.pixels if isinstance(scene.sky, SkyMap) else np.array(scene.sky)
+    shines = bool(light.max() > 0)
     return Effect("sky", shines, "the world emits light" if shines else "the world is black")
 
 

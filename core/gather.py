@@ -52,7 +52,7 @@ def gather_indirect(
         halves = halves.reshape(len(code), 2, -1).astype(np.float64) / rays
         irradiance = (halves[:, 0] + halves[:, 1]) / 2.0
         deviation = (halves[:, 0] - halves[:, 1]) / 2.0
-        behind = ((code >= codes.triangles) & (code < codes.escaped)).mean(axis=1)
+        behind = ((code >= codes.triangles) & (code < codes.lost)).mean(axis=1)
         return irradiance, deviation, behind > _ENCLOSED
 
     parts = zip(*workers.map(work, len(points.positions), hemispheres.chunk), strict=True)

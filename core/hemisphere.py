@@ -13,6 +13,7 @@ import numpy as np
 from .patches import Patches
 from .sampling import cosine_patterns, frames
 from .scene import Bool, Float32, Float64
+from .sky import DARK, Sky
 from .visibility import Visibility, offset_along
 
 #: Rays a chunk: few enough to stay in the processor's caches, enough that Python hardly counts.
@@ -22,28 +23,33 @@ _PATTERNS = 256
 
 @dataclass(frozen=True)
 class Codes:
-    """What a ray met, as one integer: triangle index for a front, plus `triangles` for a back, or one of two more."""
+    """What a ray met, as one integer: triangle index for a front, plus `triangles` for a back, or one of the others."""
 
     triangles: int
 
     @property
-    def escaped(self) -> int:
+    def lost(self) -> int:
+        """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles."""
         return 2 * self.triangles
 
     @property
-    def lost(self) -> int:
-        """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles."""
+    def escaped(self) -> int:
+        """The first of the codes of rays that left the scene, one for each texel of the sky."""
         return 2 * self.triangles + 1
 
 
 class Hemispheres:
     """Casts `rays` rays over the hemisphere of each point, as two independent sets of half as many.
 
-    rng only chooses the set of patterns; every call draws its own patterns and turns from the stream it is given.
+    rng only chooses the set of patterns; every call draws its own patterns and turns from the stream it is given. sky:
+    tells rays that leave the scene apart.
     """
 
-    def __init__(self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator) -> None:
+    def __init__(
+        self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator, sky: Sky = DARK
+    ) -> None:
         self.codes = Codes(len(patches.normals))
+        self.sky = sky
         self._visibility = visibility
         self._normals = patches.normals.astype(np.float32)
         self._choose(rays, rng)
@@ -70,8 +76,10 @@ class Hemispheres:
         directions = (pattern @ frames(shading.astype(np.float32), turn)).reshape(-1, 3)
         origins = np.repeat(offset_along(points, normals), self.rays, axis=0)
         hit = self._visibility.nearest(origins, directions)
-        code = np.where(hit < 0, self.codes.escaped, hit)
+        code = hit.copy()
         code[self._from_behind(hit, directions)] += self.codes.triangles
+        left = np.flatnonzero(hit < 0)
+        code[left] = self.codes.escaped + self.sky.texel(directions[left])
         code = code.reshape(count, self.rays)
         tilted = np.flatnonzero(np.einsum("nk,nk->n", normals, shading) < 1.0 - 1e-6)
         if len(tilted):

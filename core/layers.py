@@ -40,14 +40,13 @@ class Layers:
     def __init__(self, scene: Scene, receivers: Receivers, light: Light) -> None:
         self._receivers = receivers
         self._light = light
-        self._sky = light.open_sky[:, None] * np.pi * np.array(scene.sky)
-        self._straight = light.lamps + light.emitted + self._sky
+        self._straight = light.lamps + light.emitted + light.sky
         self._colours = constant_colours(scene, receivers.element_surface)
         self._textured = TexturedFit(scene, receivers) if any(varies(scene, o) for o in receivers.objects) else None
 
     def radiance(self, name: str) -> Float32:
         """One layer (e, 3, 3) over all output triangles. Raises SceneError for a layer that does not exist."""
-        light, dark = self._light, np.zeros_like(self._sky)
+        light, dark = self._light, np.zeros_like(self._light.sky)
         everything = self._straight + light.reflected
         layers: dict[str, Callable[[], Float64]] = {
             "combined": lambda: self._shown(everything, emits=True),
@@ -55,7 +54,7 @@ class Layers:
             "direct": lambda: self._shown(self._straight),
             "indirect": lambda: self._shown(light.reflected),
             "emission": lambda: self._shown(dark, emits=True),
-            "sky": lambda: self._shown(self._sky),
+            "sky": lambda: self._shown(light.sky),
             "error": lambda: np.repeat(_standard_error(self._receivers, light)[:, :, None], 3, axis=2),
         }
         if name not in layers:

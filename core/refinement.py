@@ -29,13 +29,13 @@ _MOST_ROUNDS, _MOST_PASSES = 3, 128
 class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
-    reflected, emitted, lamps (v, 3); open_sky (v,) share of the hemisphere; error; cell_error (c,) mean square of each
-    cell's radiance error; vertices: how many there are, how many no valid sample tells of and were
-    filled from their neighbours, and how many lie so deep inside solids that they stay dark.
+    reflected, sky, emitted, lamps (v, 3); error; cell_error (c,) mean square of each cell's radiance error; vertices:
+    how many there are, how many no valid sample tells of and were filled from their neighbours, and how many lie so
+    deep inside solids that they stay dark.
     """
 
     reflected: Float64
-    open_sky: Float64
+    sky: Float64
     emitted: Float64
     lamps: Float64
     error: ErrorEstimate
@@ -144,14 +144,14 @@ def _light(
     """Vertex values (v, channels) of direct and, if any, indirect light, by where it came from."""
     around = survey.surroundings
     dark = np.zeros((survey.receivers.vertices, 3))
-    reflected, open_sky, emitted = dark, dark[:, 0], dark
+    reflected, sky, emitted = dark, dark, dark
     if around:
         reflected = values[1][:, :3]
-        open_sky = values[1][:, around.sky].sum(axis=1)
+        sky = values[1][:, around.sky] @ around.hemispheres.sky.irradiance
         emitted = values[1][:, around.emitted] if around.emitted.stop > around.emitted.start else dark
     return Light(
         reflected=reflected,
-        open_sky=open_sky,
+        sky=sky,
         emitted=emitted,
         lamps=values[0][:, :3],
         error=error,

@@ -171,6 +171,18 @@ class AreaLamp:
     spread: float = np.pi
 
 
+@dataclass(frozen=True, eq=False)
+class SkyMap:
+    """A sky that varies with direction.
+
+    pixels (h, w, 3) float32: radiance, W/(m^2 sr), even over each pixel. Row 0 is straight down, the last straight up,
+    in equal steps of the angle to the axis; the middle of a row is +x, and columns go on by -y, -x and +y:
+    u = 1/2 - atan2(y, x) / (2 pi), as in Cycles' equirectangular environments.
+    """
+
+    pixels: Float32
+
+
 Lamp = PointLamp | SpotLamp | SunLamp | AreaLamp
 
 
@@ -181,7 +193,7 @@ class Scene:
     objects: tuple[SceneObject, ...]
     surfaces: tuple[Surface, ...]
     lamps: tuple[Lamp, ...] = ()
-    sky: RGB = (0.0, 0.0, 0.0)
+    sky: RGB | SkyMap = (0.0, 0.0, 0.0)
     warnings: tuple[str, ...] = field(default=())
 
     def receivers(self) -> tuple[SceneObject, ...]:

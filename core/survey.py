@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight, Illumination
 from .gather import Points, gather_direct, gather_indirect, shadow_boundary
-from .hemisphere import Codes, Hemispheres
+from .hemisphere import Hemispheres
 from .parallel import Workers
 from .patches import Patches
 from .plan import Effort
@@ -21,6 +21,7 @@ from .receivers import Receivers
 from .reconstruction import Samples
 from .sampling import stream
 from .scene import Bool, Float32, Float64
+from .sky import Sky
 from .transport import Transport
 from .visibility import Visibility
 
@@ -33,9 +34,9 @@ class Surroundings:
     """What rays from the receivers can bring.
 
     tables: for each half of the transport (codes, columns) radiosity by ray code. The columns are reflected light (3);
-    if the scene calls for it the open sky (1) and emitting surfaces that are not sampled as lamps (3); and last the
-    mean of the reflected light again, from coarser patches. to_grey (columns - 1,): weights that turn the columns into
-    the mean irradiance of the three channels.
+    if the scene calls for it the sky (as many as Sky.light) and emitting surfaces that are not sampled as lamps (3);
+    and last the mean of the reflected light again, from coarser patches. to_grey (columns - 1,): weights that turn the
+    columns into the mean irradiance of the three channels.
     """
 
     hemispheres: Hemispheres
@@ -49,34 +50,32 @@ def look_up(
     patches: Patches,
     visibility: Visibility,
     halves: tuple[Transport, ...],
-    sky: Float64,
+    sky: Sky,
     effort: Effort,
     seed: int,
 ) -> Surroundings | None:
     """Tables of what the solved halves send to a ray, by what it meets; None when nothing was solved."""
     if not halves:
         return None
-    seen = int(sky.max() > 0)
+    seen = sky.light.shape[1]
     by_rays = 3 * effort.emitters_by_rays
     return Surroundings(
-        hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns")),
-        tables=tuple(_table(half, seen > 0, effort.emitters_by_rays) for half in halves),
+        hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"), sky),
+        tables=tuple(_table(half, sky, effort.emitters_by_rays) for half in halves),
         sky=slice(3, 3 + seen),
         emitted=slice(3 + seen, 3 + seen + by_rays),
-        to_grey=np.concatenate([np.full(3, 1 / 3), np.full(seen, np.pi * sky.mean()), np.full(by_rays, 1 / 3)]),
+        to_grey=np.concatenate([np.full(3, 1 / 3), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / 3)]),
     )
 
 
-def _table(half: Transport, sky: bool, emitters: bool) -> Float32:
-    columns = [half.by_code(half.reflected)]
-    if sky:
-        open_sky = np.zeros((len(columns[0]), 1), dtype=np.float32)
-        open_sky[Codes(len(half.sides.patches.area)).escaped] = 1.0
-        columns.append(open_sky)
-    if emitters:
-        columns.append(half.by_code(np.pi * half.sides.emission))
-    columns.append(half.by_code(half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True))))
-    return np.concatenate(columns, axis=1)
+def _table(half: Transport, sky: Sky, emitters: bool) -> Float32:
+    emission = [np.pi * half.sides.emission] if emitters else []
+    coarser = half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True))
+    no_sky = np.zeros((len(coarser), sky.light.shape[1]))
+    met = half.by_code(np.concatenate([half.reflected, no_sky, *emission, coarser], axis=1))
+    left = np.zeros((len(sky.light), met.shape[1]), dtype=np.float32)
+    left[:, 3 : 3 + no_sky.shape[1]] = sky.light
+    return np.concatenate([met, left])
 
 
 def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:

@@ -9,13 +9,14 @@ import numpy as np
 from .direct.illumination import DirectLight
 from .form_factors.analytic import analytic_rows
 from .form_factors.centroid import centroid_rows
-from .form_factors.hemisphere import Sides, hemisphere_rows
+from .form_factors.hemisphere import Opening, Sides, hemisphere_rows
 from .form_factors.rows import Rows, balance, symmetric_exchange
 from .parallel import Workers
 from .patches import Patches, coarser_groups
 from .plan import Effort, Plan
 from .sampling import stream
 from .scene import Float32, Float64
+from .sky import Sky
 from .solver import Solution, shoot_until, solve
 from .visibility import Visibility
 
@@ -42,11 +43,12 @@ class Transport:
         return self.sides.albedo * self.solution.irradiance
 
     def by_code(self, values: Float64) -> Float32:
-        """Values (s, k) of sides as a table over ray codes; nothing for escaped and lost rays and unreached sides."""
+        """Values (s, k) of sides as a table over ray codes but those of the sky; nothing for lost rays and unreached
+        sides."""
         patches = self.sides.patches
         table = np.zeros((2 * len(patches), values.shape[1]))
         table[self.sides.side] = values
-        codes = np.concatenate([table[patches.patch], table[patches.patch + len(patches)], np.zeros_like(table[:2])])
+        codes = np.concatenate([table[patches.patch], table[patches.patch + len(patches)], np.zeros_like(table[:1])])
         return codes.astype(np.float32)
 
     def over_coarser_patches(self, values: Float64) -> Float64:
@@ -71,11 +73,11 @@ class Transport:
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """Light between sides: exchange areas G_ij or plain rows F_ij, the share (s,) that escapes, and the rays cast."""
+    """Light between sides: exchange areas G_ij or plain rows F_ij, what escapes, and the rays cast."""
 
     sides: Sides
     rows: Rows
-    escape: Float64
+    opening: Opening
     rays: int
     reciprocal: bool
 
@@ -84,7 +86,7 @@ def solve_halves(
     patches: Patches,
     visibility: Visibility,
     direct_light: DirectLight,
-    sky: Float64,
+    sky: Sky,
     plan: Plan,
     workers: Workers,
     seed: int,
@@ -104,7 +106,7 @@ def make_transport(
     patches: Patches,
     visibility: Visibility,
     direct_light: DirectLight,
-    sky: Float64,
+    sky: Sky,
     effort: Effort,
     workers: Workers,
     *,
@@ -115,10 +117,10 @@ def make_transport(
 
     `purpose` names the streams of random numbers: two purposes give two independent answers to one question.
     """
-    exchange = estimate_exchange(patches, visibility, effort, workers, seed, purpose)
+    exchange = estimate_exchange(patches, visibility, effort, workers, seed, purpose, sky)
     sides = exchange.sides
     incoming, shadow_rays = light_on_sides(sides, direct_light, workers, effort.shadow_rays, seed, purpose)
-    incoming += np.pi * exchange.escape[:, None] * sky
+    incoming += exchange.opening.light @ sky.irradiance
     if effort.emitters_by_rays:
         rows = exchange.rows.scaled(1.0 / sides.area) if exchange.reciprocal else exchange.rows
         incoming += rows.apply(np.pi * sides.emission, workers)
@@ -128,27 +130,27 @@ def make_transport(
     else:
         solution = shoot_until(exchange.rows, albedo, incoming, effort.tolerance, workers)
     rays = {"transport": exchange.rays, "shadow": shadow_rays}
-    return Transport(sides, exchange.escape, incoming, solution, rays)
+    return Transport(sides, exchange.opening.share, incoming, solution, rays)
 
 
 def estimate_exchange(
-    patches: Patches, visibility: Visibility, effort: Effort, workers: Workers, seed: int, purpose: str
+    patches: Patches, visibility: Visibility, effort: Effort, workers: Workers, seed: int, purpose: str, sky: Sky
 ) -> Exchange:
     """Rows of form factors, made reciprocal and closed together; the centroid baseline stays as it comes."""
     if effort.estimator == "hemisphere":
-        sides, rows, escape = hemisphere_rows(
-            patches, visibility, workers, rays=effort.transport_rays, seed=seed, purpose=purpose
+        sides, rows, opening = hemisphere_rows(
+            patches, visibility, workers, rays=effort.transport_rays, seed=seed, purpose=purpose, sky=sky
         )
         samples = np.full(len(rows), float(effort.transport_rays))
-        exchange = balance(symmetric_exchange(rows, sides.area, samples), sides.area * (1.0 - escape), workers)
-        return Exchange(sides, exchange, escape, len(rows) * effort.transport_rays, reciprocal=True)
+        exchange = balance(symmetric_exchange(rows, sides.area, samples), sides.area * (1.0 - opening.share), workers)
+        return Exchange(sides, exchange, opening, len(rows) * effort.transport_rays, reciprocal=True)
     estimator = analytic_rows if effort.estimator == "analytic" else centroid_rows
-    estimate = estimator(patches, visibility, workers, threshold=effort.threshold, seed=seed, purpose=purpose)
+    estimate = estimator(patches, visibility, workers, threshold=effort.threshold, seed=seed, purpose=purpose, sky=sky)
     if effort.estimator == "centroid":
-        return Exchange(estimate.sides, estimate.rows, estimate.escape, estimate.rays, reciprocal=False)
+        return Exchange(estimate.sides, estimate.rows, estimate.opening, estimate.rays, reciprocal=False)
     area = estimate.sides.area
-    exchange = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - estimate.escape), workers)
-    return Exchange(estimate.sides, exchange, estimate.escape, estimate.rays, reciprocal=True)
+    exchange = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - estimate.opening.share), workers)
+    return Exchange(estimate.sides, exchange, estimate.opening, estimate.rays, reciprocal=True)
 
 
 def light_on_sides(

@@ -14,6 +14,7 @@ from ..parallel import Workers
 from ..patches import Patches
 from ..sampling import triangle_points
 from ..scene import Float64
+from ..sky import DARK, Sky
 from ..visibility import Visibility
 from .contour import exchange_area, in_front
 from .pairs import QUARTERS, Estimate, Faces, Index, rows_by_pairs
@@ -54,7 +55,14 @@ _CHUNK = 4096
 
 
 def analytic_rows(
-    patches: Patches, visibility: Visibility, workers: Workers, *, threshold: float, seed: int, purpose: str
+    patches: Patches,
+    visibility: Visibility,
+    workers: Workers,
+    *,
+    threshold: float,
+    seed: int,
+    purpose: str,
+    sky: Sky = DARK,
 ) -> Estimate:
     """Form factors between the sides of patches; pairs below `threshold` are left out and counted as culled."""
     return rows_by_pairs(
@@ -66,6 +74,7 @@ def analytic_rows(
         threshold=threshold,
         seed=seed,
         purpose=purpose,
+        sky=sky,
     )
 
 

@@ -13,16 +13,32 @@ import numpy as np
 from ..parallel import Workers
 from ..patches import Patches
 from ..scene import Float64
+from ..sky import DARK, Sky
 from ..visibility import Visibility
 from .pairs import QUARTERS, Estimate, Faces, Index, rows_by_pairs
 
 
 def centroid_rows(
-    patches: Patches, visibility: Visibility, workers: Workers, *, threshold: float, seed: int, purpose: str
+    patches: Patches,
+    visibility: Visibility,
+    workers: Workers,
+    *,
+    threshold: float,
+    seed: int,
+    purpose: str,
+    sky: Sky = DARK,
 ) -> Estimate:
     """Form factors between the sides of patches; pairs below `threshold` are left out and counted as culled."""
     return rows_by_pairs(
-        patches, visibility, workers, centroid_exchange, quarters_share, threshold=threshold, seed=seed, purpose=purpose
+        patches,
+        visibility,
+        workers,
+        centroid_exchange,
+        quarters_share,
+        threshold=threshold,
+        seed=seed,
+        purpose=purpose,
+        sky=sky,
     )
 
 

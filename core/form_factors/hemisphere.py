@@ -15,6 +15,7 @@ from ..parallel import Workers
 from ..patches import Patches
 from ..sampling import GOLDEN, plane_points, stream, triangle_points
 from ..scene import Bool, Float32, Float64, Int32
+from ..sky import DARK, Sky
 from ..visibility import Visibility
 from .rows import Rows
 
@@ -82,15 +83,15 @@ def site_points(patches: Patches, side: Int32, seed: int, purpose: str) -> tuple
 
 
 def hemisphere_rows(
-    patches: Patches, visibility: Visibility, workers: Workers, *, rays: int, seed: int, purpose: str
-) -> tuple[Sides, Rows, Float64]:
-    """Form factors between the sides of patches, from `rays` rays a side; and the share (s,) that escapes.
+    patches: Patches, visibility: Visibility, workers: Workers, *, rays: int, seed: int, purpose: str, sky: Sky = DARK
+) -> tuple[Sides, Rows, Opening]:
+    """Form factors between the sides of patches, from `rays` rays a side; and what of them leaves the scene.
 
     Fronts are always sampled. Backs are sampled once a ray has met them, then what those meet, until nothing new is
     met.
     """
     count = len(patches)
-    hemispheres = Hemispheres(patches, visibility, rays // SITES, stream(seed, "patterns " + purpose))
+    hemispheres = Hemispheres(patches, visibility, rays // SITES, stream(seed, "patterns " + purpose), sky)
     fresh = np.arange(count, dtype=np.int32)
     met = np.zeros(2 * count, dtype=bool)
     met[:count] = True
@@ -108,13 +109,26 @@ def hemisphere_rows(
     counted = (~look.hidden).sum(axis=1) * hemispheres.rays
     weights = (look.hits / np.repeat(counted, look.length)).astype(np.float32)
     rows = Rows(np.concatenate([[0], np.cumsum(look.length)]).astype(np.int64), number[look.column], weights)
-    return sides, _mutual(rows, sides.back), look.escaped / counted
+    return sides, _mutual(rows, sides.back), Opening(look.escaped / counted, look.skylight / counted[:, None])
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """How open some sides are to the sky: share (s,) of the rays that escapes, and light (s, k), the mean over all rays
+    of what Sky.light says they bring."""
+
+    share: Float64
+    light: Float64
+
+    def scaled(self, factors: Float64) -> Opening:
+        """The same with all of side i times factors[i]."""
+        return Opening(self.share * factors, self.light * factors[:, None])
 
 
 @dataclass(frozen=True, eq=False)
 class _Look:
     """What the rays of some sides met: the sides with their sites, how many entries each has, the side met (global
-    number) and the hits on it, and the rays that escaped."""
+    number) and the hits on it, the rays that escaped, and the sum of the light that they brought (s, k)."""
 
     side: Int32
     points: Float64
@@ -124,6 +138,7 @@ class _Look:
     column: Int32
     hits: Index
     escaped: Index
+    skylight: Float64
 
 
 def _look_around(
@@ -132,23 +147,34 @@ def _look_around(
     codes = hemispheres.codes
     # From a ray's code to the side it met. Escaped rays go to a column beyond all sides, ignored ones beyond that.
     escaped, ignored = 2 * len(patches), 2 * len(patches) + 1
-    side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [escaped, ignored]]).astype(np.int32)
+    light = hemispheres.sky.light
+    texels = np.full(len(light), escaped)
+    side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [ignored], texels]).astype(np.int32)
     points, normals = site_points(patches, side, seed, purpose)
 
-    def work(number: int, part: slice) -> tuple[Bool, Index, Int32, Index, Index]:
+    def work(number: int, part: slice) -> tuple[Bool, Index, Int32, Index, Index, Float64]:
         rng = stream(seed, "rows " + purpose, number)
         origins, axes = points[part].reshape(-1, 3), normals[part].reshape(-1, 3)
         met = hemispheres.cast(origins, axes, axes, rng).reshape(-1, SITES, hemispheres.rays)
-        hidden = _hidden(((met >= codes.triangles) & (met < codes.escaped)).mean(axis=2))
+        hidden = _hidden(((met >= codes.triangles) & (met < codes.lost)).mean(axis=2))
         columns = side_of_code[met]
         columns[hidden] = ignored
         columns = columns.reshape(len(met), -1)
+        skylight = _light_of_escaped(light, met.reshape(len(met), -1) - codes.escaped, columns == escaped)
         columns.sort(axis=1)
-        return hidden, *_run_lengths(columns, escaped)
+        return hidden, *_run_lengths(columns, escaped), skylight
 
     chunk = max(1, hemispheres.chunk // SITES)
     parts = zip(*workers.map(work, len(side), chunk), strict=True)
     return _Look(side, points, normals, *(np.concatenate(p) for p in parts))
+
+
+def _light_of_escaped(light: Float32, texel: Int32, escaped: Bool) -> Float64:
+    """Sums (n, k) of light (texels, k) over the escaped among the rays (n, r) of each side."""
+    side = np.nonzero(escaped)[0]
+    brought = light[texel[escaped]]
+    sums = [np.bincount(side, channel, len(texel)) for channel in brought.T]
+    return np.stack(sums, axis=1) if sums else np.zeros((len(texel), 0))
 
 
 def _hidden(behind: Float64) -> Bool:

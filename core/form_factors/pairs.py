@@ -17,8 +17,9 @@ from ..parallel import Workers
 from ..patches import Patches
 from ..sampling import stream
 from ..scene import Bool, Float64
+from ..sky import Sky
 from ..visibility import Visibility, offset_along
-from .hemisphere import Sides, hemisphere_rows
+from .hemisphere import Opening, Sides, hemisphere_rows
 from .rows import Rows
 
 Index = NDArray[np.int64]
@@ -114,13 +115,13 @@ VisibleShare = Callable[[Faces, Visibility, Index, Index, np.random.Generator], 
 class Estimate:
     """Form factors between sides (s,), and where the rest of each side's light goes.
 
-    escape (s,): share that leaves the scene. culled (s,): share that went to pairs below the threshold, as if nothing
+    opening: what leaves the scene. culled (s,): share that went to pairs below the threshold, as if nothing
     stood between them. rays cast.
     """
 
     sides: Sides
     rows: Rows
-    escape: Float64
+    opening: Opening
     culled: Float64
     rays: int
 
@@ -135,13 +136,14 @@ def rows_by_pairs(
     threshold: float,
     seed: int,
     purpose: str,
+    sky: Sky,
 ) -> Estimate:
     """All pairs of faces, each once, so that A_i F_ij = A_j F_ji holds by construction.
 
     Pairs whose form factors stay below `threshold` both ways are culled before any ray is cast.
     """
     sides, _, probed = hemisphere_rows(
-        patches, visibility, workers, rays=_PROBES, seed=seed, purpose=f"probe {purpose}"
+        patches, visibility, workers, rays=_PROBES, seed=seed, purpose=f"probe {purpose}", sky=sky
     )
     faces = Faces.of(sides)
     area = sides.area
@@ -166,5 +168,8 @@ def rows_by_pairs(
         np.concatenate([i, j]), np.concatenate([j, i]), np.concatenate([amount / area[i], amount / area[j]]), len(area)
     )
     culled = np.sum(lost, axis=0) / area
-    escape = np.where(probed > 0.0, np.clip(1.0 - rows.row_sums() - culled, 0.0, 1.0), 0.0)
-    return Estimate(sides, rows, escape, culled, sum(rays) + _PROBES * len(area))
+    # The rays tell from where in the sky the light comes, the form factors how much of it.
+    escape = np.clip(1.0 - rows.row_sums() - culled, 0.0, 1.0)
+    seen = probed.share > 0.0
+    opening = probed.scaled(np.divide(escape, probed.share, out=np.zeros(len(area)), where=seen))
+    return Estimate(sides, rows, opening, culled, sum(rays) + _PROBES * len(area))

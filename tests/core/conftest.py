@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
@@ -17,6 +16,7 @@ from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import AreaLamp, Scene, Surface
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.shapes import box, quad, sphere, triangles
+from radiosity_baker.core.sky import Sky
 from radiosity_baker.core.transport import Transport, make_transport
 from radiosity_baker.core.visibility import Visibility
 
@@ -76,7 +76,7 @@ def transport(workers):
         patches = patches_of(scene, asked.patches)
         visibility = Visibility(patches.corners)
         direct_light = DirectLight(list(lights), visibility, seed)
-        sky = np.array(scene.sky)
+        sky = Sky.of(scene.sky)
         return make_transport(patches, visibility, direct_light, sky, asked, workers, seed=seed, purpose=purpose)
 
     return run

@@ -102,7 +102,7 @@ def test_rows_of_a_closed_cube_sum_to_one(wanted: int) -> None:
     found = estimate(room(), wanted=wanted)
     assert len(found.sides.side) == len(found.sides.patches)
     assert found.rows.row_sums() == pytest.approx(1.0, abs=1e-4)
-    assert found.escape.max() == 0.0
+    assert found.opening.share.max() == 0.0
 
 
 @pytest.mark.parametrize("albedo", [0.5, 0.9, 0.99])
@@ -111,7 +111,7 @@ def test_furnace(albedo: float, wanted: int) -> None:
     """Every side emits 1, so every radiosity is 1/(1 - albedo)."""
     found = estimate(room(), wanted=wanted)
     count, area = len(found.rows), found.sides.area
-    balanced = balance(symmetric_exchange(found.rows, area), area * (1 - found.escape))
+    balanced = balance(symmetric_exchange(found.rows, area), area * (1 - found.opening.share))
     factors = np.zeros((count, count))
     factors[balanced.owners(), balanced.columns] = balanced.weights / area[balanced.owners()]
     radiosity = np.linalg.solve(np.eye(count) - albedo * factors, np.ones(count))
@@ -134,7 +134,7 @@ def test_box_in_a_room_neither_loses_nor_gains_light() -> None:
     sums = found.rows.row_sums()
     assert np.average(sums, weights=found.sides.area) == pytest.approx(1.0, abs=0.01)
     assert np.abs(sums - 1).max() < 0.15
-    assert found.escape.max() == 0.0
+    assert found.opening.share.max() == 0.0
 
 
 def test_a_wall_between_leaves_nothing() -> None:
@@ -189,7 +189,7 @@ def test_culled_light_is_reported() -> None:
     found = estimate(room(), wanted=200, threshold=5e-3)
     assert found.culled.max() > 0.05
     assert found.rows.row_sums() + found.culled == pytest.approx(1.0, abs=1e-4)
-    assert found.escape.max() == 0.0
+    assert found.opening.share.max() == 0.0
 
 
 @pytest.mark.parametrize("threshold", [0.0, 5e-3])
@@ -201,9 +201,11 @@ def test_open_sky_escapes(threshold: float) -> None:
     lid = np.flatnonzero((CORNERS[INWARD][:, :, 2] == 1).all(axis=1))
     found = estimate(mesh("cube", CORNERS, np.delete(INWARD, lid, axis=0)), wanted=100, threshold=threshold)
     front = ~found.sides.back
-    assert (found.rows.row_sums() + found.escape + found.culled)[front] == pytest.approx(1.0, abs=1e-6)
+    assert (found.rows.row_sums() + found.opening.share + found.culled)[front] == pytest.approx(1.0, abs=1e-6)
     ground = front & (found.sides.patches.normals[found.sides.patch][:, 2] > 0.5)
-    assert np.average(found.escape[ground], weights=found.sides.area[ground]) == pytest.approx(0.199824896, abs=1e-3)
+    assert np.average(found.opening.share[ground], weights=found.sides.area[ground]) == pytest.approx(
+        0.199824896, abs=1e-3
+    )
     assert (found.culled.max() > 0.01) == (threshold > 0)
 
 

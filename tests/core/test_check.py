@@ -9,7 +9,16 @@ import pytest
 
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.check import check_scene
-from radiosity_baker.core.scene import ALBEDO_LIMIT, AreaLamp, PointLamp, Scene, SceneError, SceneObject, Surface
+from radiosity_baker.core.scene import (
+    ALBEDO_LIMIT,
+    AreaLamp,
+    PointLamp,
+    Scene,
+    SceneError,
+    SceneObject,
+    SkyMap,
+    Surface,
+)
 from radiosity_baker.core.settings import Settings
 
 NAN = float("nan")
@@ -40,6 +49,8 @@ BAD = {
     "no receiver": (lambda s: with_object(s, receives=False), "Nothing to bake"),
     "vertex too high": (lambda s: with_object(s, triangles=np.array([[0, 1, 4], [0, 2, 3]], np.int32)), "'Floor'"),
     "vertex negative": (lambda s: with_object(s, triangles=np.array([[0, 1, -1], [0, 2, 3]], np.int32)), "'Floor'"),
+    "sky not a number": (lambda s: replace(s, sky=(0.0, NAN, 0.0)), "The sky"),
+    "sky map negative": (lambda s: replace(s, sky=SkyMap(np.full((2, 4, 3), -1, np.float32))), "The sky"),
     "no such material": (lambda s: with_object(s, surface=np.array([0, 1], np.int32)), "'Floor'"),
     "too few materials": (lambda s: with_object(s, surface=np.zeros(1, np.int32)), "'Floor'"),
     "vertex not a number": (lambda s: with_vertex(s, NAN), "'Floor'"),

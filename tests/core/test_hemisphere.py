@@ -94,17 +94,17 @@ def test_the_two_halves_of_the_rays_are_each_a_whole_hemisphere(build):
 def test_rows_and_what_escapes_add_up_to_one(build, workers):
     block, floor = build.box(), build.quad(corner=(-2, -2, -0.5), u=(5, 0, 0), v=(0, 5, 0))
     patches = build.patches(Scene((floor, block), SIX), 400)
-    sides, rows, escape = rows_of(patches, workers, 64)
+    sides, rows, opening = rows_of(patches, workers, 64)
     assert not sides.back.any()
-    assert rows.row_sums() + escape == pytest.approx(1.0, abs=64 * 2.0**-24)
+    assert rows.row_sums() + opening.share == pytest.approx(1.0, abs=64 * 2.0**-24)
     height = sides.points[:, :, 2].min(axis=1)
-    assert (escape[height > height.max() - 1e-9] == 1).all(), "the top sees only the sky"
+    assert (opening.share[height > height.max() - 1e-9] == 1).all(), "the top sees only the sky"
 
 
 def test_a_closed_room_lets_nothing_escape(build, workers):
     patches = build.patches(Scene((build.box(inward=True),), SIX), 400)
-    sides, _, escape = rows_of(patches, workers, 256)
-    assert escape.max() == 0
+    sides, _, opening = rows_of(patches, workers, 256)
+    assert opening.share.max() == 0
     assert len(sides.side) == len(patches), "its outside is not part of it"
 
 
@@ -140,7 +140,7 @@ def test_backs_take_part_where_rays_meet_them(build, workers):
     floor = build.quad("floor", (-1, -1, 0), (3, 0, 0), (0, 3, 0), surface=0)
     plane = build.quad("plane", (0, 0, 1), surface=1)
     patches = build.patches(Scene((floor, plane), SIX), 200)
-    sides, rows, escape = rows_of(patches, workers, 256)
+    sides, rows, opening = rows_of(patches, workers, 256)
     of_plane = sides.albedo[:, 0] > 0.15
     assert (of_plane & sides.back).sum() == (of_plane & ~sides.back).sum()
     assert not sides.back[~of_plane].any()
@@ -151,7 +151,7 @@ def test_backs_take_part_where_rays_meet_them(build, workers):
     forth, home = sides.area @ (ground * rows.apply(back)), sides.area @ (back * rows.apply(ground))
     slack = binomial(forth / (sides.area @ ground), 256 * int(ground.sum())) * (sides.area @ ground)
     assert forth == pytest.approx(home, abs=2 * slack)
-    assert escape[of_plane & ~sides.back] == pytest.approx(1.0)
+    assert opening.share[of_plane & ~sides.back] == pytest.approx(1.0)
 
 
 def test_sites_are_spread_over_the_area_of_their_patch(build):

@@ -16,6 +16,7 @@ from radiosity_baker.core.plan import plan
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.sky import DARK
 from radiosity_baker.core.transport import make_transport, solve_halves
 from radiosity_baker.core.visibility import Visibility
 
@@ -154,17 +155,17 @@ def test_tables_hold_the_light_of_the_side_that_a_ray_meets(build, transport):
     patches = solved.sides.patches
     codes = Codes(len(patches.area))
     table = solved.by_code(solved.reflected)
-    assert table.shape == (2 * len(patches.area) + 2, 3)
+    assert table.shape == (2 * len(patches.area) + 1, 3)
     row_of = {int(side): row for row, side in enumerate(solved.sides.side)}
     for triangle, patch in enumerate(patches.patch.tolist()):
         for code, side in ((triangle, patch), (triangle + codes.triangles, patch + len(patches))):
             expected = solved.reflected[row_of[side]] if side in row_of else np.zeros(3)
             assert table[code] == pytest.approx(expected, rel=1e-6)
     above = np.isclose(patches.albedo[patches.patch, 0], 0.3)
-    fronts, backs = table[: codes.triangles], table[codes.triangles : codes.escaped]
+    fronts, backs = table[: codes.triangles], table[codes.triangles : codes.lost]
     assert backs[above].min() > fronts[above].max()
     assert backs[~above].max() == 0, "nothing reaches under the ground"
-    assert (table[[codes.escaped, codes.lost]] == 0).all()
+    assert (table[codes.lost] == 0).all()
 
 
 def test_coarser_patches_keep_constants_and_means(build, transport):
@@ -183,11 +184,11 @@ def test_halves_are_independent_answers_to_one_question(build, workers):
     visibility = Visibility(patches.corners)
     light = DirectLight([place(lamp, space) for lamp in scene.lamps], visibility, 0)
     planned = plan(scene, Settings(error=0.08))
-    one, two = solve_halves(patches, visibility, light, np.zeros(3), planned, workers, 0)
+    one, two = solve_halves(patches, visibility, light, DARK, planned, workers, 0)
     assert one.solution.irradiance.tobytes() != two.solution.irradiance.tobytes()
     assert one.energy()["absorbed"] == pytest.approx(two.energy()["absorbed"], rel=0.03)
     black = Scene(scene.objects, (Surface("black", (0, 0, 0)),) * 3, scene.lamps)
-    assert solve_halves(patches, visibility, light, np.zeros(3), plan(black, Settings()), workers, 0) == ()
+    assert solve_halves(patches, visibility, light, DARK, plan(black, Settings()), workers, 0) == ()
 
 
 @pytest.mark.parametrize("estimator", ["hemisphere", "analytic", "centroid"])
@@ -200,6 +201,6 @@ def test_threads_do_not_change_a_byte(build, estimator):
     for threads in (1, 2):
         with Workers(threads, Progress()) as workers:
             effort = build.effort(estimator=estimator)
-            solved = make_transport(patches, visibility, light, np.zeros(3), effort, workers, seed=0, purpose="threads")
+            solved = make_transport(patches, visibility, light, DARK, effort, workers, seed=0, purpose="threads")
         found.append(solved.solution.irradiance.tobytes())
     assert found[0] == found[1]

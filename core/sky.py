@@ -1,0 +1,66 @@
+"""The sky as rays find it: a table of what they bring by the direction in which they leave the scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .scene import RGB, Float32, Float64, Int32, SkyMap
+
+#: Texels of a sky that is not even. All have the same solid angle, 0.0015 sr, about (2.2 degrees)^2.
+_ROWS, _COLUMNS = 64, 128
+
+
+@dataclass(frozen=True, eq=False)
+class Sky:
+    """Texels: rows of equal height in z from straight down to straight up, columns of equal longitude as in a SkyMap.
+
+    light (rows * columns, k) float32: what a ray that leaves through each texel brings. A black sky has k = 0, an even
+    one k = 1, for then rays need only be counted, and any other one the three channels. irradiance (k, 3): turns the
+    mean of that over cosine-distributed rays into W/m^2.
+    """
+
+    rows: int
+    columns: int
+    light: Float32
+    irradiance: Float64
+
+    @staticmethod
+    def of(sky: RGB | SkyMap) -> Sky:
+        if isinstance(sky, SkyMap):
+            texels = equal_texels(sky, _ROWS, _COLUMNS).reshape(-1, 3)
+            return Sky(_ROWS, _COLUMNS, (np.pi * texels).astype(np.float32), np.eye(3))
+        shines = int(max(sky) > 0)
+        return Sky(1, 1, np.ones((1, shines), dtype=np.float32), np.pi * np.array([sky] * shines).reshape(-1, 3))
+
+    def texel(self, directions: Float32) -> Int32:
+        """Number of the texel (n,) that each unit vector (n, 3) points to."""
+        if len(self.light) == 1:
+            return np.zeros(len(directions), dtype=np.int32)
+        x, y, z = directions.T
+        row = (z + 1) * np.float32(self.rows / 2)
+        column = (np.float32(0.5) - np.arctan2(y, x) * np.float32(0.5 / np.pi)) * np.float32(self.columns)
+        row = np.clip(row.astype(np.int32), 0, self.rows - 1)
+        return row * np.int32(self.columns) + np.minimum(column.astype(np.int32), self.columns - 1)
+
+
+def equal_texels(sky: SkyMap, rows: int, columns: int) -> Float64:
+    """Means (rows, columns, 3) of a map over texels of equal solid angle, in which its energy is kept exactly."""
+    pixels = sky.pixels.astype(np.float64)
+    height, width = pixels.shape[:2]
+    by_row = _overlap(-np.cos(np.linspace(0.0, np.pi, height + 1)), np.linspace(-1.0, 1.0, rows + 1))
+    by_column = _overlap(np.linspace(0.0, 1.0, width + 1), np.linspace(0.0, 1.0, columns + 1))
+    means = [by_row @ pixels[..., k] @ by_column.T for k in range(3)]
+    return np.stack(means, axis=-1)
+
+
+def _overlap(old: Float64, new: Float64) -> Float64:
+    """(new intervals, old intervals): which share of each new interval an old one covers, from their borders."""
+    low = np.maximum(old[None, :-1], new[:-1, None])
+    high = np.minimum(old[None, 1:], new[1:, None])
+    return np.asarray(np.maximum(high - low, 0.0) / np.diff(new)[:, None])
+
+
+#: A sky that brings nothing.
+DARK = Sky.of((0.0, 0.0, 0.0))
