@@ -17,8 +17,8 @@ from ..core.scene import Float64, Scene
 
 #: Height of a probe over the surface and size of a probe, relative to the extent of all receivers.
 _HEIGHT, _SIZE = 1e-5, 2e-5
-#: More bounces than any light survives.
-_BOUNCES = 64
+#: As many bounces as Cycles takes: at an albedo of 0.95, 64 would lose a thirtieth of the light.
+_BOUNCES = 1024
 _ATTRIBUTE = "Radiosity Reference"
 
 

@@ -2,9 +2,11 @@
 
 Three causes, independent enough to add as squares:
 - sampling: how much the fits of two independent halves of all samples differ;
-- transport: how much the gathered light changes when the patches it comes from are twice as large;
-- resolution: what is left of the samples' distance from the other half's fit once their own noise is taken away. No
-  amount of computing lowers it on the same vertices.
+- transport: how much the gathered light changes when the patches it comes from are twice as large, and what follows
+  from that for the patches there are (Richardson's extrapolation);
+- resolution: what the triangles cannot show, however long one computes: by how much the shown light bends from triangle
+  to triangle, by what is left of the samples' distance from it once their own noise is taken away, and by what
+  smoothing has taken.
 All are root mean squares over the receivers' surface, relative to the mean radiance (design: the surface error).
 """
 
@@ -54,29 +56,77 @@ UNKNOWN = ErrorEstimate(np.inf, np.inf, np.inf)
 
 #: How much the fit may weigh smoothness, from hardly to a lot.
 ALPHAS = (0.02, 0.5, 5.0)
+#: Mean squared jump of the gradient over mean squared error, of the least smooth fit of a step and of a parabola.
+STEP_BEND, PARABOLA_BEND = 6.0, 70.0
+#: By how much the light changes with coarser patches, over its error with the patches there are. Triangles that lie
+#: four to a square become a square: the second moments that blur the light grow by three (A/9 of a right-angled
+#: triangle, A/3 of a square). The error falls with the length to the power of 1.5: with its square everywhere else, but
+#: it is largest in a strip beside edges that is as wide as a patch, where it falls with the length itself.
+COARSENING = 3.0**0.75 - 1.0
 
 
-def fit_halves(fit: Fit, halves: list[Samples], area: Float64) -> Fitted:
+def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -> Fitted:
     """Fit with the alpha at which each half of the samples best predicts the other (cross-validation), judged by the
-    mean light. area (c,) of the cells."""
+    mean light. area (c,) of the cells; shown (c,): what a squared error of the light there counts."""
     grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
-    lowest, alpha = np.inf, ALPHAS[0]
-    residual = spread = np.zeros(len(area))
-    values: list[Float64 | None] = [None, None]
-    for candidate in ALPHAS:
-        values = [fit.solve(system, candidate, start) for system, start in zip(systems, values, strict=True)]
-        first, second = (fit.at_corners(v)[..., 0] for v in values if v is not None)
+    tried: list[_Halves] = []
+    start: list[Float64 | None] = [None, None]
+    for alpha in ALPHAS:
+        values = [fit.solve(system, alpha, begin) for system, begin in zip(systems, start, strict=True)]
+        first, second = (fit.at_corners(v)[..., 0] for v in values)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
-        score = float(area @ predicted)
-        if score > lowest:
+        tried.append(_Halves(alpha, first, second, predicted))
+        if len(tried) > 1 and area @ predicted > area @ tried[-2].predicted:
+            tried.pop()
             break
-        lowest, alpha, residual, spread = score, candidate, predicted, squared_mean(first - second)
-    count = np.maximum(grey[0].count + grey[1].count, 1.0)
-    own_noise = (grey[0].noise + grey[1].noise) / count
+        if alpha == ALPHAS[0]:
+            bend = fit.bending(*values)
+        start = [*values]
+    sharpest, best = tried[0], tried[-1]
+    own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
+    unseen = _unresolved(bend, sharpest.predicted - own_noise - sharpest.spread / 2.0, area * shown)
     merged = halves[0] + halves[1]
-    together = fit.solve_within(fit.system(merged), alpha, merged)
-    return Fitted(alpha, together, together @ halves[0].to_grey, spread / 4.0, residual - own_noise - spread / 2.0)
+    together = fit.solve_within(fit.system(merged), best.alpha, merged)
+    return Fitted(
+        best.alpha, together, together @ halves[0].to_grey, best.spread / 4.0, unseen + best.smoothed_by(sharpest)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Halves:
+    """The fits of both halves at the cells' corners (c, 3), and how well each predicts the other's samples (c,)."""
+
+    alpha: float
+    first: Float64
+    second: Float64
+    predicted: Float64
+
+    @property
+    def spread(self) -> Float64:
+        return squared_mean(self.first - self.second)
+
+    def smoothed_by(self, sharper: _Halves) -> Float64:
+        """(c,) squared change from a sharper fit, unbiased: the product of what two independent halves say of it."""
+        one, other = self.first - sharper.first, self.second - sharper.second
+        return (squared_mean(one + other) - squared_mean(one - other)) / 4.0
+
+
+def _unresolved(bend: Float64, left: Float64, weight: Float64) -> Float64:
+    """Squared error (c,) of the least smooth fit, from two witnesses: its own bends, and what is `left` of the samples'
+    squared distance from it without their noise.
+
+    A bend is certain, but whether it means a step, a kink or a curve is not: then the error is a sixth to a seventieth
+    of it. What is left is right on average, but a small difference of large numbers. Each counts by its variance.
+    """
+    guess = max(float(weight @ bend), 0.0) / np.sqrt(STEP_BEND * PARABOLA_BEND)
+    doubt = float(np.sum((weight * left) ** 2))
+    if guess <= 0.0:
+        return np.zeros_like(bend)
+    told = (doubt * guess + guess**2 * float(weight @ left)) / (doubt + guess**2)
+    spread = np.sqrt(PARABOLA_BEND / STEP_BEND)
+    where = np.maximum(bend, 0.0)
+    return np.asarray(where * (np.clip(told, guess / spread, guess * spread) / float(weight @ where)))
 
 
 def squared_mean(corners: Float64) -> Float64:
@@ -85,19 +135,18 @@ def squared_mean(corners: Float64) -> Float64:
 
 
 def estimate_error(
-    parts: list[Fitted], coarser: Float64, area: Float64, reflectance: Float64, scale: float
+    parts: list[Fitted], coarser: Float64, area: Float64, shown: Float64, scale: float
 ) -> tuple[ErrorEstimate, Float64]:
     """The three errors relative to the mean radiance, and the squared error (c,) of each cell's radiance.
 
-    parts: the fits whose sum is the light; coarser (c,): change of the grey irradiance with coarser patches.
-    reflectance (c,): root mean square over the channels of albedo / pi, from grey irradiance to radiance; scale: mean
-    radiance, W/(m^2 sr), times what colour takes from the mean of squares.
+    parts: the fits whose sum is the light; coarser (c,): squared change of the mean irradiance with coarser patches.
+    shown (c,): mean square over the channels of albedo / pi, from mean irradiance to radiance; scale: mean radiance,
+    W/(m^2 sr).
     """
     if scale <= 0:
         return ErrorEstimate(0.0, 0.0, 0.0), np.zeros_like(area)
-    weight = area * reflectance**2 / area.sum()
-    sampling = sum(p.sampling for p in parts)
-    resolution = sum(p.resolution for p in parts)
-    causes = [np.sqrt(max(float(weight @ cause), 0.0)) / scale for cause in (sampling, coarser**2, resolution)]
-    local = np.maximum(sampling + coarser**2 + np.maximum(resolution, 0.0), 0.0) * reflectance**2
+    squares = [sum(p.sampling for p in parts), coarser / COARSENING**2, sum(p.resolution for p in parts)]
+    weight = area * shown / area.sum()
+    causes = [np.sqrt(max(float(weight @ square), 0.0)) / scale for square in squares]
+    local = sum(np.maximum(square, 0.0) for square in squares) * shown
     return ErrorEstimate(causes[0], causes[1], causes[2]), local

@@ -170,15 +170,18 @@ def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
 
 
 def coarser_groups(patches: Patches) -> Int32:
-    """The group (p,) of each patch when about four neighbours that face the same way, of one surface, become one."""
+    """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
+    become one: those whose centres lie in one cube of a grid, each side of it as large as four of them."""
     weight = patches.area / patches.patch_area[patches.patch]
     count = len(patches)
     center, facing = (
         np.stack([np.bincount(patches.patch, weight * values[:, k], count) for k in range(3)], axis=1)
         for values in (patches.corners.mean(axis=1), patches.normals)
     )
-    edge = 2.0 * np.sqrt(2.0 * np.median(patches.patch_area))
-    key = np.column_stack([np.floor(center / edge), np.rint(facing * 1.5), patches.surface])
+    median = np.median(patches.patch_area)
+    level = np.rint(np.log2(patches.patch_area / median) / 2.0)[:, None]
+    edge = 2.0 * np.sqrt(median) * 2.0**level
+    key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), patches.surface])
     return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
 
 

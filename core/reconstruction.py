@@ -119,7 +119,7 @@ class Fit:
         self._pattern = SymmetricPattern(self._count, np.concatenate([self._edge_ends, apexes]).astype(np.int64))
         self._penalty = np.bincount(
             jumps.vertices.ravel(), (jumps.weight[:, None] * jumps.jump**2).ravel(), self._count
-        )
+        ).astype(np.float64)
         products = jumps.weight[:, None] * jumps.jump[:, _SIDE_START] * jumps.jump[:, _SIDE_END]
         on_edges = np.bincount(self._edge.ravel()[jumps.sides].ravel(), products[:, :-1].ravel(), len(self._edge_ends))
         self._pair_penalty = np.concatenate([on_edges, products[:, -1]])
@@ -190,6 +190,14 @@ class Fit:
         pairs = alpha * self._pair_penalty
         pairs[: len(system.edges)] += system.edges
         return SymmetricMatrix(self._pattern, system.diagonal + alpha * self._penalty, pairs)
+
+    def bending(self, one: Float64, other: Float64) -> Float64:
+        """(c,) mean over each cell of the product of the gradient's jumps in two fits (v, 1): their common squared
+        jump, to which independent noise adds nothing on average."""
+        penalty = SymmetricMatrix(self._pattern, self._penalty, self._pair_penalty)
+        energy = (one * (penalty @ other) + other * (penalty @ one))[:, 0] / 2.0
+        around = self._scatter(np.repeat(self._receivers.cells.area[:, None] / 3.0, 3, axis=1))
+        return np.asarray((energy / np.maximum(around, np.finfo(float).tiny))[self._corner].mean(axis=1))
 
     def at_corners(self, values: Float64) -> Float64:
         """(c, 3, k): what interpolation of vertex values (v, k) starts from in each cell's output triangle."""

@@ -101,14 +101,11 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     cells = receivers.cells
     fit = Fit(receivers, survey.valid_samples, survey.invalid)
     sampled = [survey.direct, survey.indirect] if around else [survey.direct]
-    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area), len(sampled), 1))
     colours = cell_colours(scene, receivers)
+    shown = np.mean((colours.albedo / np.pi) ** 2, axis=1)
+    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area, shown), len(sampled), 1))
     error, cell_error = estimate_error(
-        fits,
-        survey.coarser / max(survey.passes, 1),
-        cells.area,
-        np.sqrt(np.mean(colours.albedo**2, axis=1)) / np.pi,
-        _mean_radiance(survey, colours, fits),
+        fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, _mean_radiance(survey, colours, fits)
     )
     vertices = {
         "all": receivers.vertices,

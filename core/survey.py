@@ -99,8 +99,8 @@ def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indir
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
-    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue. coarser (c,): sum
-    over passes of the difference that coarser patches make.
+    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue. coarser: for each
+    half (c,) the change that coarser patches make to the mean irradiance, by one pass each: that is sure enough.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Survey:
         to_grey = surroundings.to_grey if surroundings else np.zeros(0)
         self.indirect = [Samples(count, to_grey), Samples(count, to_grey)]
         self.direct = [Samples(count, np.full(3, 1 / 3)), Samples(count, np.full(3, 1 / 3))]
-        self.coarser = np.zeros(count)
+        self.coarser = [np.zeros(count), np.zeros(count)]
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
         self.rays = {"gather": 0, "shadow": 0}
@@ -151,16 +151,18 @@ class Survey:
 
     def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
         """Add the indirect light at the points; which of them (c,) are in sight."""
-        half = number % 2
+        half, columns = number % 2, len(around.to_grey)
+        table = around.tables[half] if number < 2 else around.tables[half][:, :columns]
         arriving, deviation, enclosed = gather_indirect(
-            points, around.hemispheres, around.tables[half], self._seed, number, self._workers
+            points, around.hemispheres, table, self._seed, number, self._workers
         )
         self.rays["gather"] += len(arriving) * around.hemispheres.rays
-        self.coarser += arriving[:, -1] - arriving[:, :3].mean(axis=1)
-        values = arriving[:, :-1]
+        values = arriving[:, :columns]
+        if number < 2:
+            self.coarser[half] = arriving[:, columns] - values[:, :3].mean(axis=1)
         grey = values @ around.to_grey
         valid = ~out_of_sight(points, around.hemispheres, enclosed, grey, light.irradiance.mean(axis=1))
-        noise = (deviation[:, :-1] @ around.to_grey) ** 2
+        noise = (deviation[:, :columns] @ around.to_grey) ** 2
         self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
         return valid
 

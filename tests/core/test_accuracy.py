@@ -1,0 +1,140 @@
+"""The estimates of the error, on light whose error is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.accuracy import (
+    ALPHAS,
+    PARABOLA_BEND,
+    STEP_BEND,
+    _unresolved,
+    fit_halves,
+    squared_mean,
+)
+from radiosity_baker.core.patches import coarser_groups, unit_space
+from radiosity_baker.core.receivers import make_receivers
+from radiosity_baker.core.reconstruction import Fit, Samples
+from radiosity_baker.core.sampling import plane_points, triangle_points
+from radiosity_baker.core.scene import Scene
+from radiosity_baker.core.settings import Settings
+
+DIRECTIONS = 8
+
+
+@pytest.fixture(scope="module")
+def floor(build):
+    scene = Scene((build.quad(),), (build.grey,))
+    return make_receivers(scene, unit_space(scene), Settings(), 800)
+
+
+def sample(receivers, light, passes, rng, noise=0.0) -> Samples:
+    """One channel, with normal noise of a known deviation."""
+    cells, count = receivers.cells, len(receivers.cells)
+    samples, shift = Samples(count, np.ones(1)), rng.random((count, 2))
+    for number in range(passes):
+        weights = triangle_points(plane_points(np.full(count, number), shift))
+        points = np.einsum("nc,nck->nk", weights, cells.corners)
+        values = light(points) + noise * rng.standard_normal(count)
+        samples.add(slice(None), weights, values[:, None], np.full(count, noise**2), np.ones(count, bool))
+    return samples
+
+
+def squared_error(receivers, light, corners, rng) -> float:
+    """Mean over the floor of (light - fit)^2, by 40 points a cell."""
+    cells, total = receivers.cells, 0.0
+    for number in range(40):
+        weights = triangle_points(plane_points(np.full(len(cells), number), rng.random((len(cells), 2))))
+        points = np.einsum("nc,nck->nk", weights, cells.corners)
+        total += cells.area @ (light(points) - np.einsum("nc,nc->n", weights, corners)) ** 2 / 40
+    return total / cells.area.sum()
+
+
+def fronts(profile):
+    """Light that changes across a straight front, in all directions."""
+    for k in range(DIRECTIONS):
+        angle = np.pi * (k + 0.37) / DIRECTIONS
+        along = np.array([np.cos(angle), np.sin(angle), 0.0])
+        yield lambda points, along=along: profile(points @ along - 0.03)
+
+
+@pytest.mark.parametrize(
+    ("profile", "low", "high"),
+    [
+        (lambda t: (t > 0) * 1.0, 0.8 * STEP_BEND, 1.25 * STEP_BEND),
+        (lambda t: t**2, 0.8 * PARABOLA_BEND, 1.25 * PARABOLA_BEND),
+        (lambda t: np.maximum(t, 0), STEP_BEND, PARABOLA_BEND),
+        (lambda t: np.sqrt(np.maximum(t, 0)), STEP_BEND, PARABOLA_BEND),
+    ],
+    ids=["step", "parabola", "kink", "root"],
+)
+def test_the_error_of_a_fit_is_a_known_share_of_its_bends(floor, profile, low, high):
+    """A step and a parabola are the two ends; over all directions each ratio scatters by less than a quarter."""
+    rng = np.random.default_rng(1)
+    bend = error = 0.0
+    for light in fronts(profile):
+        samples = sample(floor, light, 4, rng)
+        fit = Fit(floor, samples.count, np.zeros(len(floor.cells), bool))
+        values = fit.solve(fit.system(samples), ALPHAS[0])
+        bend += floor.cells.area @ fit.bending(values, values) / floor.cells.area.sum()
+        error += squared_error(floor, light, fit.at_corners(values)[..., 0], rng)
+    assert low < bend / error < high
+
+
+def test_independent_noise_bends_nothing(floor):
+    """The product of n independent bends of either sign is 1/sqrt(n) of their squares; here within four deviations."""
+    rng = np.random.default_rng(2)
+    halves = [sample(floor, lambda points: np.ones(len(points)), 2, rng, noise=1.0) for _ in range(2)]
+    fit = Fit(floor, halves[0].count, np.zeros(len(floor.cells), bool))
+    first, second = (fit.solve(fit.system(half), ALPHAS[0]) for half in halves)
+    area = floor.cells.area
+    alone = area @ fit.bending(first, first)
+    assert alone > 0
+    assert abs(area @ fit.bending(first, second)) < 4 * alone / np.sqrt(floor.vertices / 3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
+def test_the_stated_error_is_the_true_one(floor, noise):
+    """A soft front with sampling noise: stated over true within the 0.7 to 1.5 that a person is promised."""
+    rng = np.random.default_rng(3)
+    stated = true = 0.0
+    one = np.ones(len(floor.cells))
+    for light in fronts(lambda t: np.clip(t / 0.1, 0, 1)):
+        halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
+        fit = Fit(floor, halves[0].count, np.zeros(len(floor.cells), bool))
+        fitted = fit_halves(fit, halves, floor.cells.area, one)
+        stated += floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
+        true += squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
+    assert 0.7 < np.sqrt(stated / true) < 1.5
+
+
+def test_two_witnesses_count_by_what_they_know():
+    """A thousand cells that agree are sure to one part in a thousand; two that contradict each other know nothing."""
+    many, few = np.tile([1.0, 3.0], 500), np.array([1.0, 3.0])
+    middle = 2.0 / np.sqrt(STEP_BEND * PARABOLA_BEND)
+    assert _unresolved(few, np.array([1e6, -1e6]), np.full(2, 0.5)).mean() == pytest.approx(middle, rel=1e-3)
+    each = np.full(1000, 1e-3)
+    assert _unresolved(many, np.full(1000, 2 * middle), each).mean() == pytest.approx(2 * middle, rel=5e-3)
+    # It lies where the bends are, and is never less than of a curve nor more than of a step.
+    assert _unresolved(many, np.full(1000, middle), each)[:2] == pytest.approx([middle / 2, middle * 1.5], rel=5e-3)
+    assert _unresolved(many, np.full(1000, 5 * middle), each).mean() == pytest.approx(2.0 / STEP_BEND)
+    assert _unresolved(many, np.full(1000, -middle), each).mean() == pytest.approx(2.0 / PARABOLA_BEND)
+    assert _unresolved(np.zeros(2), np.ones(2), np.ones(2)).tolist() == [0, 0]
+
+
+def test_the_mean_of_a_squared_linear_function():
+    """Of x on the triangle (0, 0), (1, 0), (0, 1): the integral of x^2 is 1/12, over an area of 1/2."""
+    assert squared_mean(np.array([[0.0, 1.0, 0.0]])) == pytest.approx(1 / 6)
+
+
+def test_coarser_groups_blur_as_squares_of_four_patches(build):
+    """Second moments about the centre: A/9 each way of a right-angled triangle with equal legs, A/3 of a square of four
+    of them: three times as much. A grid that cuts across the triangles makes it a little more."""
+    made = build.patches(Scene((build.quad(),), (build.grey,)), 2048)
+    center, group = made.corners.mean(axis=1), coarser_groups(made)
+    weight = np.bincount(group, made.patch_area)
+    middle = np.stack([np.bincount(group, made.patch_area * x) / weight for x in center.T], axis=1)
+    between = np.sum(made.patch_area[:, None] * (center - middle[group]) ** 2)
+    within = np.sum(made.patch_area**2 * 2 / 9)
+    assert 2.0 < (between + within) / within < 4.0
