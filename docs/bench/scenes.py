@@ -19,7 +19,7 @@ Objects = list[bpy.types.Object]
 
 
 def cornell_box() -> Objects:
-    """A box of 2 m, open in front, with a red and a green wall, two blocks on its floor and a lamp under its ceiling."""
+    """A box of 2 m, open in front, with a red and a green wall, two blocks on its floor, a lamp under its ceiling."""
     white, red, green = (
         _diffuse(n, c) for n, c in (("White", (0.75,) * 3), ("Red", (0.6, 0.06, 0.05)), ("Green", (0.12, 0.45, 0.1)))
     )
@@ -73,7 +73,9 @@ def curved_meshes() -> Objects:
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=0.6, location=(0.1, -1.3, 0.35))
     bpy.context.object.scale.z = 0.5
     made.append(_smooth(white))
-    _lamp("Spot", "SPOT", 400.0, (-2.5, -2.5, 4), (0, 0, 0), spot_size=radians(50), spot_blend=0.3, shadow_soft_size=0.1)
+    _lamp(
+        "Spot", "SPOT", 400.0, (-2.5, -2.5, 4), (0, 0, 0), spot_size=radians(50), spot_blend=0.3, shadow_soft_size=0.1
+    )
     _lamp("Point", "POINT", 60.0, (1.8, -1.4, 2.0), (0, 0, 0), shadow_soft_size=0.15)
     return [floor, *made]
 
