@@ -1,7 +1,9 @@
-"""Materials and worlds as one constant albedo and one constant emission each: the diffuse part of what Cycles sees.
+"""Materials and worlds as albedo and emission: the diffuse part of what Cycles sees.
 
-A table maps each shader node to its converter; a node that is not in it is named in a warning. Only constants are read:
-unlinked sockets, and RGB and Value nodes.
+A table maps each shader node to its converter, another each node that gives colours. What they give is either constant
+or an image: colours (3,) or (h, w, 3), numbers (1,) or (h, w, 1), which numpy combines by itself. Colour attributes are
+read where they multiply the albedo. For a node that is in no table the plain value behind the link is used, and its
+name is kept in a warning: the material can still be sampled by Cycles (`material_bake.py`).
 """
 
 from __future__ import annotations
@@ -9,12 +11,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Literal
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
-from ..core.scene import ALBEDO_LIMIT, RGB, Float64, Surface
+from ..core.scene import ALBEDO_LIMIT, RGB, Float64, Surface, Texture
 from .compat import shader_tree
+from .images import MISSING, UnreadableImage, has_pixels, read_image
 
 #: What Cycles gives faces without a material: its default Principled BSDF, of which `_principled` makes this.
 DEFAULT_SURFACE = Surface("", albedo=(0.8, 0.8, 0.8))
@@ -22,18 +27,59 @@ DEFAULT_SURFACE = Surface("", albedo=(0.8, 0.8, 0.8))
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
-def read_material(material: bpy.types.Material) -> tuple[Surface, list[str]]:
-    """The surface that Cycles' diffuse bake would see, and warnings that name what could not be read."""
+@dataclass(frozen=True)
+class Placement:
+    """How an image lies on a mesh: by which UV map (empty: the active one for rendering), moved by matrix (2, 3), and
+    what is between and beyond its pixels."""
+
+    uv_map: str
+    matrix: tuple[tuple[float, float, float], ...]
+    extension: Literal["repeat", "extend", "clip", "mirror"]
+    interpolation: Literal["linear", "closest"]
+
+
+@dataclass(frozen=True)
+class MaterialSurface(Surface):
+    """A surface, and what of the mesh it takes.
+
+    placement of its textures. color_attribute: what multiplies its albedo; None: nothing, empty: the active one for
+    rendering. unread: warnings of nodes that only Cycles can read. by_object: it takes its object's colour.
+    """
+
+    placement: Placement | None = None
+    color_attribute: str | None = None
+    unread: tuple[str, ...] = ()
+    by_object: bool = False
+
+
+def read_material(
+    material: bpy.types.Material, object_color: Sequence[float] = (1.0, 1.0, 1.0)
+) -> tuple[MaterialSurface, list[str]]:
+    """The surface that Cycles' diffuse bake would see, and warnings that name what could not be read.
+
+    object_color: of the object that has it, for the Object Info node.
+    """
     tree = shader_tree(material)
     if tree is None:
-        return Surface(material.name, albedo=_rgb(np.array(material.diffuse_color[:3]))), []
-    reader = _TreeReader(f"Material '{material.name}'")
+        return MaterialSurface(material.name, albedo=_rgb(np.array(material.diffuse_color[:3]))), []
+    reader = _TreeReader(f"Material '{material.name}'", object_color)
     shading = reader.output(tree)
     if shading.albedo.max() > ALBEDO_LIMIT:
         reader.warn(f"reflects more than it receives; its colour is limited to {ALBEDO_LIMIT}. Lower the base colour.")
-    albedo = np.clip(shading.albedo, 0.0, ALBEDO_LIMIT)
-    emission = np.maximum(shading.emission, 0.0)
-    return Surface(material.name, albedo=_rgb(albedo), emission=_rgb(emission)), reader.warnings
+    albedo, albedo_texture = reader.split(np.clip(shading.albedo, 0.0, ALBEDO_LIMIT))
+    emission, emission_texture = reader.split(np.maximum(shading.emission, 0.0))
+    surface = MaterialSurface(
+        material.name,
+        albedo=albedo,
+        emission=emission,
+        albedo_texture=albedo_texture,
+        emission_texture=emission_texture,
+        placement=reader.placement,
+        color_attribute=shading.color_attribute,
+        unread=tuple(reader.unread),
+        by_object=reader.by_object,
+    )
+    return surface, reader.warnings
 
 
 def read_world(world: bpy.types.World | None) -> tuple[RGB, list[str]]:
@@ -58,29 +104,41 @@ def read_lamp_nodes(lamp: bpy.types.Light) -> tuple[RGB, list[str]]:
 
 @dataclass(frozen=True)
 class _Shading:
-    """albedo and emission: (3,) float64."""
+    """albedo and emission: (3,) or (h, w, 3) float64. color_attribute: multiplies the albedo, as in MaterialSurface."""
 
     albedo: Float64 = field(default_factory=lambda: np.zeros(3))
     emission: Float64 = field(default_factory=lambda: np.zeros(3))
+    color_attribute: str | None = None
 
-    def scaled(self, factor: float) -> _Shading:
-        return _Shading(self.albedo * factor, self.emission * factor)
 
-    def plus(self, other: _Shading) -> _Shading:
-        return _Shading(self.albedo + other.albedo, self.emission + other.emission)
+class Unreadable(ValueError):
+    """A node that this module does not know, or not as it is used. The message goes on after the node's name."""
 
 
 class _TreeReader:
-    """Follows the links of one node tree from its output; collects warnings that begin with the owner's name."""
+    """Follows the links of one node tree from its output; collects warnings that begin with the owner's name.
 
-    def __init__(self, owner: str) -> None:
+    object_color: of the object whose faces the tree shades; None for lamps and worlds, over which nothing varies.
+    placement: of the images found so far, all alike. unread: the warnings of what only Cycles can read.
+    """
+
+    def __init__(self, owner: str, object_color: Sequence[float] | None = None) -> None:
         self.owner = owner
+        self.object_color = None if object_color is None else np.array(object_color[:3], np.float64)
         self.warnings: list[str] = []
+        self.unread: list[str] = []
+        self.placement: Placement | None = None
+        self.by_object = False
 
     def warn(self, message: str) -> None:
         warning = f"{self.owner} {message}"
         if warning not in self.warnings:
             self.warnings.append(warning)
+
+    def cannot_read(self, message: str) -> None:
+        """Warn of what only Cycles can read."""
+        self.warn(message)
+        self.unread.append(f"{self.owner} {message}")
 
     def output(self, tree: bpy.types.NodeTree) -> _Shading:
         node = tree.get_output_node("CYCLES")
@@ -95,7 +153,8 @@ class _TreeReader:
             return _Shading()
         converter = CONVERTERS.get(source.node.bl_idname)
         if converter is None:
-            self.warn(
+            report = self.warn if source.node.bl_idname in NOT_DIFFUSE else self.cannot_read
+            report(
                 f"uses the node {source.node.bl_label}, which has no diffuse part or is not read yet: it is taken as "
                 "black. Use Diffuse BSDF, Principled BSDF, Emission, Mix Shader or Add Shader."
             )
@@ -103,27 +162,91 @@ class _TreeReader:
         return converter(self, source.node)
 
     def colour(self, socket: bpy.types.NodeSocket) -> Float64:
-        value = self._constant(socket)
-        return np.full(3, float(value)) if isinstance(value, float) else np.array(value[:3], np.float64)
+        """(3,) or (h, w, 3)."""
+        value = self._value(socket)
+        return np.repeat(value, 3, axis=-1) if value.shape[-1] == 1 else value
+
+    def tint(self, socket: bpy.types.NodeSocket) -> tuple[Float64, str | None]:
+        """The colour of a socket, and the colour attribute that it is to be multiplied by."""
+        source = _source(socket)
+        if source is not None and source.node.bl_idname == "ShaderNodeVertexColor" and source.name == "Color":
+            return np.ones(3), source.node.layer_name
+        return self.colour(socket), None
+
+    def amount(self, socket: bpy.types.NodeSocket | None, default: float = 0.0) -> Float64:
+        """(1,) or (h, w, 1): a number; `default` where this Blender's node lacks the socket."""
+        if socket is None:
+            return np.array([default])
+        value = self._value(socket)
+        return value if value.shape[-1] == 1 else (value @ LUMINANCE)[..., None]
 
     def number(self, socket: bpy.types.NodeSocket | None, default: float = 0.0) -> float:
-        """Value of a socket; `default` where this Blender's node lacks it."""
-        if socket is None:
-            return default
-        value = self._constant(socket)
-        return value if isinstance(value, float) else float(np.dot(value[:3], LUMINANCE))
+        """A number, or the mean of one that varies; `default` where this Blender's node lacks the socket."""
+        return float(self.amount(socket, default).mean())
 
-    def _constant(self, socket: bpy.types.NodeSocket) -> float | Sequence[float]:
+    def _value(self, socket: bpy.types.NodeSocket) -> Float64:
+        """(k,) or (h, w, k): what feeds a socket, k = 1 for numbers and 3 for colours."""
         source = _source(socket)
         if source is None:
-            return socket.default_value
-        if source.node.bl_idname in {"ShaderNodeRGB", "ShaderNodeValue"}:
-            return source.default_value
-        self.warn(
-            f"takes its {socket.name} from the node {source.node.bl_label}, which is not read yet: the plain value "
-            f"behind the link is used. Set that value to the average, or unlink it."
+            return _plain(socket)
+        try:
+            return VALUES.get(source.node.bl_idname, _unknown)(self, source.node, source)
+        except Unreadable as problem:
+            self.cannot_read(
+                f"takes its {socket.name} from the node {source.node.bl_label}, which {problem or 'is not read yet'}: "
+                "the plain value behind the link is used. Set that value to the average, or unlink it."
+            )
+            return _plain(socket)
+
+    def sum(self, one: _Shading, share: Float64, two: _Shading, other: Float64) -> _Shading:
+        """Shares (1,) or (h, w, 1) of two shadings together."""
+        if one.color_attribute != two.color_attribute and one.albedo.any() and two.albedo.any():
+            self.cannot_read("mixes a colour attribute with other colours: it is left out.")
+        attribute = one.color_attribute if one.albedo.any() else two.color_attribute
+        try:
+            self.check_black_beyond(one.albedo, two.albedo, one.emission, two.emission, share)
+        except Unreadable as problem:
+            self.cannot_read(f"mixes shaders, which {problem}.")
+        first, second, share, other = self.alike(one.albedo, two.albedo, share, other)
+        glow, second_glow, glow_share, glow_other = self.alike(one.emission, two.emission, share, other)
+        return _Shading(first * share + second * other, glow * glow_share + second_glow * glow_other, attribute)
+
+    def alike(self, *values: Float64) -> tuple[Float64, ...]:
+        """The same values, images among them with as many pixels as the largest has; or with their means alone where
+        that cannot be."""
+        sizes = {value.shape[:2] for value in values if value.ndim == 3}
+        if len(sizes) < 2:
+            return values
+        height, width = (max(size[k] for size in sizes) for k in (0, 1))
+        if any(height % size[0] or width % size[1] for size in sizes):
+            self.cannot_read("combines images of different sizes: their means are used.")
+            return tuple(value.mean(axis=(0, 1)) if value.ndim == 3 else value for value in values)
+        return tuple(
+            value.repeat(height // value.shape[0], axis=0).repeat(width // value.shape[1], axis=1)
+            if value.ndim == 3
+            else value
+            for value in values
         )
-        return socket.default_value
+
+    def place(self, placement: Placement) -> None:
+        """One more image. Raises Unreadable when it lies otherwise than those before it."""
+        if self.placement not in (None, placement):
+            raise Unreadable("lies otherwise on the faces than another image")
+        self.placement = placement
+
+    def split(self, values: Float64) -> tuple[RGB, Texture | None]:
+        """What a surface holds of a colour: a factor, and the texture it multiplies, if it is one."""
+        if values.ndim == 1 or self.placement is None:
+            return _rgb(values), None
+        factor = (1.0, 1.0, 1.0) if values.any() else (0.0, 0.0, 0.0)
+        pixels = np.ascontiguousarray(values, np.float32)
+        return factor, Texture(pixels, self.placement.extension, self.placement.interpolation)
+
+    def check_black_beyond(self, *values: Float64) -> None:
+        """Raise Unreadable when values that are added belong to images that end: beyond them the others remain."""
+        ends = self.placement is not None and self.placement.extension == "clip"
+        if ends and any(value.ndim == 3 for value in values):
+            raise Unreadable("adds something to an image that is clipped")
 
 
 def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
@@ -144,17 +267,24 @@ def _source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
             return link.from_socket
 
 
+def _plain(socket: bpy.types.NodeSocket) -> Float64:
+    """(1,) or (3,): the value of an unlinked socket."""
+    return np.atleast_1d(np.array(socket.default_value, np.float64))[:3]
+
+
 def _diffuse(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
-    colour = reader.colour(node.inputs["Color"])
-    return _Shading(albedo=rough_albedo(colour, reader.number(node.inputs["Roughness"])))
+    colour, attribute = reader.tint(node.inputs["Color"])
+    return _Shading(rough_albedo(colour, reader.number(node.inputs["Roughness"])), color_attribute=attribute)
 
 
 def _subsurface(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
-    return _Shading(albedo=reader.colour(node.inputs["Color"]))
+    colour, attribute = reader.tint(node.inputs["Color"])
+    return _Shading(colour, color_attribute=attribute)
 
 
 def _emission(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
-    return _Shading(emission=reader.colour(node.inputs["Color"]) * reader.number(node.inputs["Strength"]))
+    colour, strength = reader.alike(reader.colour(node.inputs["Color"]), reader.amount(node.inputs["Strength"]))
+    return _Shading(emission=colour * strength)
 
 
 def _principled(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
@@ -164,34 +294,38 @@ def _principled(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
     node at base colour 0.8 is 0.8085, 0.770 of it diffuse and the rest the layer's reflection. Under a sun it is 0.93
     where the light comes from behind the viewer and 0.79 where it comes at 45 degrees: that highlight is not baked.
     """
-    metallic = reader.number(node.inputs["Metallic"])
-    transmission = reader.number(node.inputs["Transmission Weight"])
-    if metallic > 0.0:
-        reader.warn(f"is {metallic:.0%} metallic: mirror reflections are not baked, so that share of it stays dark.")
-    if transmission > 0.0:
-        reader.warn(f"transmits {transmission:.0%} of the light: it is baked as opaque, and that share stays dark.")
+    metallic = reader.amount(node.inputs["Metallic"])
+    transmission = reader.amount(node.inputs["Transmission Weight"])
+    if metallic.max() > 0.0:
+        reader.warn(f"is {metallic.mean():.0%} metallic: mirror reflections are not baked, so that share stays dark.")
+    if transmission.max() > 0.0:
+        reader.warn(
+            f"transmits {transmission.mean():.0%} of the light: it is baked as opaque, and that share stays dark."
+        )
     if reader.number(node.inputs["Alpha"]) < 1.0:
         reader.warn("is transparent (Alpha below 1): it is baked as opaque.")
-    base = rough_albedo(reader.colour(node.inputs["Base Color"]), reader.number(node.inputs.get("Diffuse Roughness")))
-    return _Shading(
-        albedo=base * (1.0 - metallic) * (1.0 - transmission),
-        emission=reader.colour(node.inputs["Emission Color"]) * reader.number(node.inputs["Emission Strength"]),
+    colour, attribute = reader.tint(node.inputs["Base Color"])
+    base = rough_albedo(colour, reader.number(node.inputs.get("Diffuse Roughness")))
+    base, metallic, transmission = reader.alike(base, metallic, transmission)
+    glow, strength = reader.alike(
+        reader.colour(node.inputs["Emission Color"]), reader.amount(node.inputs["Emission Strength"])
     )
+    return _Shading(base * (1.0 - metallic) * (1.0 - transmission), glow * strength, attribute)
 
 
 def _mix(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
-    second = min(max(reader.number(node.inputs[0]), 0.0), 1.0)
-    return reader.shader(node.inputs[1]).scaled(1.0 - second).plus(reader.shader(node.inputs[2]).scaled(second))
+    second = np.clip(reader.amount(node.inputs[0]), 0.0, 1.0)
+    return reader.sum(reader.shader(node.inputs[1]), 1.0 - second, reader.shader(node.inputs[2]), second)
 
 
 def _add(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
-    return reader.shader(node.inputs[0]).plus(reader.shader(node.inputs[1]))
+    return reader.sum(reader.shader(node.inputs[0]), np.ones(1), reader.shader(node.inputs[1]), np.ones(1))
 
 
 def rough_albedo(colour: Float64, roughness: float) -> Float64:
     """Share of even light that Cycles' rough diffuse surface (energy preserving Oren-Nayar) sends along its normal.
 
-    colour: (3,). From Portsmouth, Kutz, Hill, "EON: a practical energy-preserving rough diffuse BRDF" (2025), which
+    colour: (..., 3). From Portsmouth, Kutz, Hill, "EON: a practical energy-preserving rough diffuse BRDF" (2025), which
     agrees with furnaces in Cycles 5.0.1 to 1e-4. Light from one side only differs: at colour 0.8 and roughness 1 by 5 %
     when it falls straight on and by 11 % at 80 degrees.
     """
@@ -212,6 +346,163 @@ CONVERTERS: dict[str, Callable[[_TreeReader, bpy.types.Node], _Shading]] = {
     "ShaderNodeBackground": _emission,
     "ShaderNodeMixShader": _mix,
     "ShaderNodeAddShader": _add,
+}
+
+
+#: Shaders that send no light back in all directions.
+NOT_DIFFUSE = {
+    "ShaderNodeBsdfAnisotropic",
+    "ShaderNodeBsdfGlass",
+    "ShaderNodeBsdfGlossy",
+    "ShaderNodeBsdfMetallic",
+    "ShaderNodeBsdfRefraction",
+    "ShaderNodeBsdfTransparent",
+    "ShaderNodeHoldout",
+}
+
+
+def _unknown(_: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:  # noqa: ARG001
+    raise Unreadable
+
+
+def _constant(_: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:  # noqa: ARG001
+    return _plain(output)
+
+
+def _object_info(reader: _TreeReader, _: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
+    if output.name != "Color" or reader.object_color is None:
+        raise Unreadable
+    reader.by_object = True
+    return reader.object_color
+
+
+def _image(reader: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
+    """Pixels as Cycles shows them: colours with an alpha that is not used are premultiplied."""
+    if reader.object_color is None:
+        raise Unreadable
+    if node.projection != "FLAT":
+        raise Unreadable(f"projects its image as a {node.projection.lower()}")
+    image = node.image
+    if image is None or not has_pixels(image):
+        missing = (
+            f"the image '{image.name}' has no pixels" if image else f"its node {node.label or node.name} has no image"
+        )
+        reader.warn(f"shows pink, as in a render, because {missing}: find the file, or choose another image.")
+        return np.array(MISSING[:3]) if output.name == "Color" else np.ones(1)
+    try:
+        pixels = read_image(image)
+    except UnreadableImage as problem:
+        raise Unreadable(f"has an image, '{image.name}', {problem}") from problem
+    reader.place(_placement(node))
+    alpha = pixels[..., 3:]
+    if output.name == "Alpha":
+        return np.ones(1) if image.alpha_mode == "NONE" else alpha.astype(np.float64)
+    colour = pixels[..., :3].astype(np.float64)
+    data = image.colorspace_settings.is_data or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}
+    straight = not image.is_float
+    if data or alpha.min() >= 1.0:
+        return colour
+    if node.outputs["Alpha"].is_linked:
+        return colour if straight else np.divide(colour, alpha, out=colour, where=alpha > 0.0)
+    return colour * alpha if straight else colour
+
+
+def _placement(node: bpy.types.Node) -> Placement:
+    extensions = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
+    uv_map, matrix = _coordinates(node.inputs["Vector"])
+    rows = tuple((row[0], row[1], row[3]) for row in matrix[:2])
+    closest = node.interpolation == "Closest"
+    return Placement(uv_map, rows, extensions[node.extension], "closest" if closest else "linear")
+
+
+def _coordinates(socket: bpy.types.NodeSocket) -> tuple[str, Matrix]:
+    """UV map by name, and what moves its coordinates. Raises Unreadable for all but UV maps and Mapping nodes."""
+    source = _source(socket)
+    if source is None:
+        return "", Matrix()
+    node = source.node
+    if node.bl_idname == "ShaderNodeUVMap" and not node.from_instancer:
+        return node.uv_map, Matrix()
+    if node.bl_idname == "ShaderNodeTexCoord" and source.name == "UV" and not node.from_instancer:
+        return "", Matrix()
+    if node.bl_idname == "ShaderNodeMapping" and node.vector_type in {"POINT", "TEXTURE"}:
+        moves = [node.inputs[name] for name in ("Location", "Rotation", "Scale")]
+        if all(_source(move) is None for move in moves) and _source(node.inputs["Vector"]) is not None:
+            location, rotation, scale = (move.default_value for move in moves)
+            own = Matrix.LocRotScale(location, rotation.to_quaternion(), scale)
+            uv_map, before = _coordinates(node.inputs["Vector"])
+            return uv_map, (own if node.vector_type == "POINT" else own.inverted_safe()) @ before
+    raise Unreadable(f"takes its place from the node {node.bl_label}")
+
+
+def _mix_colours(reader: _TreeReader, node: bpy.types.Node, _: bpy.types.NodeSocket) -> Float64:
+    """Mix, Multiply and Add of two colours."""
+    if node.bl_idname == "ShaderNodeMix":
+        if node.data_type != "RGBA":
+            raise Unreadable("mixes numbers or vectors")
+        factor, one, two = (_by_identifier(node, name) for name in ("Factor_Float", "A_Color", "B_Color"))
+        clamped = node.clamp_result
+    else:
+        factor, one, two = node.inputs
+        clamped = node.use_clamp
+    share = np.clip(reader.amount(factor), 0.0, 1.0)
+    share, first, second = reader.alike(share, reader.colour(one), reader.colour(two))
+    reader.check_black_beyond(share, first, second)
+    blend = BLENDS.get(node.blend_type)
+    if blend is None:
+        raise Unreadable(f"mixes colours by {node.blend_type.title()}")
+    mixed = first * (1.0 - share) + blend(first, second) * share
+    return np.clip(mixed, 0.0, 1.0) if clamped else mixed
+
+
+def _by_identifier(node: bpy.types.Node, identifier: str) -> bpy.types.NodeSocket:
+    return next(socket for socket in node.inputs if socket.identifier == identifier)
+
+
+def _separate(reader: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
+    if node.mode != "RGB":
+        raise Unreadable(f"separates a colour into {node.mode}")
+    index = ("Red", "Green", "Blue").index(output.name)
+    return reader.colour(node.inputs[0])[..., index : index + 1]
+
+
+def _math(reader: _TreeReader, node: bpy.types.Node, _: bpy.types.NodeSocket) -> Float64:
+    operation = OPERATIONS.get(node.operation)
+    if operation is None:
+        raise Unreadable(f"calculates {node.operation.title()}")
+    one, two = reader.alike(*(reader.amount(socket) for socket in node.inputs[:2]))
+    if node.operation != "MULTIPLY":
+        reader.check_black_beyond(one, two)
+    result = operation(one, two)
+    return np.clip(result, 0.0, 1.0) if node.use_clamp else result
+
+
+def _grey(reader: _TreeReader, node: bpy.types.Node, _: bpy.types.NodeSocket) -> Float64:
+    return reader.amount(node.inputs[0])
+
+
+BLENDS: dict[str, Callable[[Float64, Float64], Float64]] = {
+    "MIX": lambda _, second: second,
+    "MULTIPLY": np.multiply,
+    "ADD": np.add,
+}
+OPERATIONS: dict[str, Callable[[Float64, Float64], Float64]] = {
+    "MULTIPLY": np.multiply,
+    "ADD": np.add,
+    "SUBTRACT": np.subtract,
+}
+
+#: Node to its value at one of its outputs.
+VALUES: dict[str, Callable[[_TreeReader, bpy.types.Node, bpy.types.NodeSocket], Float64]] = {
+    "ShaderNodeRGB": _constant,
+    "ShaderNodeValue": _constant,
+    "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeTexImage": _image,
+    "ShaderNodeMix": _mix_colours,
+    "ShaderNodeMixRGB": _mix_colours,
+    "ShaderNodeSeparateColor": _separate,
+    "ShaderNodeMath": _math,
+    "ShaderNodeRGBToBW": _grey,
 }
 
 
