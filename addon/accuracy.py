@@ -19,7 +19,8 @@ from ..core.scene import Bool, Float64, Scene, SceneError
 from ..core.settings import Settings
 from .bake_scene import bake_objects
 from .oracle import corner_bake, true_radiance
-from .scene_reader import ReceiverSource, read_scene
+from .receiver_source import ReceiverSource
+from .scene_reader import read_scene
 
 #: Of the points and of Cycles' paths. Not the bake's: another seed of the bake is judged by the same reference.
 _SEED = 7

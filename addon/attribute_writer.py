@@ -14,8 +14,9 @@ import numpy as np
 from ..core.result import BakedObject, BakeResult
 from ..core.scene import Float32, SceneError
 from .copies import put_copies, remove_copies, replace_mesh
+from .receiver_source import ReceiverSource
 from .render_visibility import shown_as_rendered
-from .scene_reader import ReceiverSource, check_same_corners, evaluated_mesh
+from .scene_reader import check_same_corners, evaluated_mesh
 from .slices import Steps, at_once, breathe
 from .tessellated_mesh import MeshData, build_mesh
 

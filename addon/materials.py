@@ -75,7 +75,7 @@ def read_material(
         albedo_texture=albedo_texture,
         emission_texture=emission_texture,
         placement=reader.placement,
-        color_attribute=shading.color_attribute,
+        color_attribute=None if reader.unread else shading.color_attribute,
         unread=tuple(reader.unread),
         by_object=reader.by_object,
     )

@@ -4,35 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
-from ..core.scene import Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, Surface
+from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, Surface
 from .copies import copies_of, original_of, place_of
+from .corner_values import corner_colors, corner_uv
 from .lamps import read_lamp
-from .materials import DEFAULT_SURFACE, read_material, read_world
+from .material_samples import MaterialSamples, Sampled
+from .materials import DEFAULT_SURFACE, MaterialSurface, read_material, read_world
+from .receiver_source import ReceiverSource
 from .render_visibility import rendered_objects, shown_as_rendered
-
-
-@dataclass(frozen=True, eq=False)
-class ReceiverSource:
-    """Where a receiver's triangles come from, without holding on to Blender's data.
-
-    name: of the object and of its SceneObject. session_uid: Blender's number for it, which survives renaming and undo.
-    corners (t, 3) int32: the mesh corner (loop) of each corner of SceneObject.triangles. polygons (t,) int32: the face
-    each came from. flipped: corners were put in reverse order, since a negative scale mirrors the object.
-    corner_count and vertex_count tell whether the mesh was edited meanwhile.
-    """
-
-    name: str
-    session_uid: int
-    corners: Int32
-    polygons: Int32
-    flipped: bool
-    corner_count: int
-    vertex_count: int
 
 
 def pick_receivers(
@@ -73,7 +57,8 @@ def read_scene(
     rendered = rendered_objects(view_layer)
     for obj in receivers:
         _check_rendered(obj, rendered)
-    reading = _Reading(set(receivers), rendered, copies_of(view_layer))
+    samples = MaterialSamples(depsgraph.scene.frame_current)
+    reading = _Reading(set(receivers), rendered, copies_of(view_layer), samples)
     with shown_as_rendered(view_layer):
         depsgraph.update()
         for instance in depsgraph.object_instances:
@@ -82,6 +67,7 @@ def read_scene(
             for obj in receivers:
                 with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
                     check_same_corners(obj, mesh)
+    reading.take_samples()
     sky, warnings = read_world(depsgraph.scene_eval.world)
     scene = Scene(
         objects=tuple(reading.objects),
@@ -126,16 +112,20 @@ class _Reading:
         receivers: set[bpy.types.Object],
         rendered: set[bpy.types.Object],
         copies: dict[bpy.types.Object, bpy.types.Object],
+        samples: MaterialSamples,
     ) -> None:
         self.receivers = receivers
         self.rendered = rendered
         self.copies = copies
+        self.samples = samples
         self.objects: list[SceneObject] = []
         self.sources: list[ReceiverSource] = []
         self.lamps: list[Lamp] = []
         self.surfaces = _SurfaceTable()
         self.warnings: list[str] = []
         self._meshes: dict[int, _LocalMesh] = {}
+        # For each object with a material to be sampled: its place in `objects`, the number, the order of its corners.
+        self._sampled: list[tuple[int, int, list[int]]] = []
 
     def add(self, instance: bpy.types.DepsgraphObjectInstance) -> None:
         # Curves, texts, surfaces and metaballs come a second time, as the mesh that they evaluate to.
@@ -175,14 +165,22 @@ class _Reading:
             )
         flipped = bool(np.linalg.det(matrix[:3, :3]) < 0.0)
         turn = [0, 2, 1] if flipped else [0, 1, 2]
+        surface = self.surfaces.of_faces(obj, mesh.material_index)
+        if self.surfaces.unread(surface).any():
+            with evaluated_mesh(obj) as data:
+                number = self.samples.add(obj, data, name, matrix, _materials(obj))
+            self._sampled.append((len(self.objects), number, turn))
+        uv, colors = self._corner_values(obj, mesh, surface)
         self.objects.append(
             SceneObject(
                 name,
                 vertices=mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3],
                 triangles=mesh.triangles[:, turn],
-                surface=self.surfaces.of_faces(obj, mesh.material_index),
+                surface=surface,
                 corner_normals=_world_normals(mesh.corner_normals, matrix[:3, :3], turn),
                 receives=receives,
+                uv=uv if uv is None else uv[:, turn],
+                colors=colors if colors is None else colors[:, turn],
             )
         )
         if receives:
@@ -197,6 +195,33 @@ class _Reading:
                     vertex_count=len(mesh.vertices),
                 )
             )
+
+    def take_samples(self) -> None:
+        """Put what Cycles finds in the place of materials that could not be read; without Cycles the warnings stay."""
+        try:
+            sampled = self.samples.take()
+        except RuntimeError as problem:
+            self.warnings.append(f"Cycles could not sample the materials, so plain values are used: {problem}")
+            return
+        for index, number, turn in self._sampled:
+            own = self.objects[index]
+            unread = self.surfaces.unread(own.surface)
+            uv = np.zeros((*own.triangles.shape, 2), np.float32) if own.uv is None else own.uv
+            uv[unread] = sampled[number].uv[unread][:, turn]
+            surface = own.surface.copy()
+            surface[unread] = self.surfaces.sampled(own.surface[unread], number, sampled[number])
+            self.objects[index] = replace(own, surface=surface, uv=uv)
+        self.surfaces.forget_unread()
+
+    def _corner_values(
+        self, obj: bpy.types.Object, mesh: _LocalMesh, surface: Int32
+    ) -> tuple[Float32 | None, Float32 | None]:
+        """Places in textures, and colours, of the corners of the mesh's triangles, where its surfaces take any."""
+        if not self.surfaces.takes_corner_values(surface):
+            return None, None
+        with evaluated_mesh(obj) as data:
+            uv = corner_uv(data, mesh.corners, surface, self.surfaces.all)
+            return uv, corner_colors(data, mesh.corners, surface, self.surfaces.all)
 
     def _mesh(self, obj: bpy.types.Object) -> _LocalMesh:
         key = obj.data.as_pointer()
@@ -242,12 +267,12 @@ class _LocalMesh:
 
 
 class _SurfaceTable:
-    """Surfaces of the scene, one per material that some face uses."""
+    """Surfaces of the scene, one per material that some face uses; more where a material depends on its object."""
 
     def __init__(self) -> None:
         self.all: list[Surface] = []
         self.warnings: list[str] = []
-        self._index: dict[str | None, int] = {}
+        self._index: dict[tuple[object, ...], int] = {}
 
     def of_faces(self, obj: bpy.types.Object, material_index: Int32) -> Int32:
         """Surface of each face, (t,) int32. As in Cycles, indices beyond the last slot mean the last slot."""
@@ -255,16 +280,48 @@ class _SurfaceTable:
         slot = np.clip(material_index, 0, len(materials) - 1)
         surface = np.zeros(len(materials), np.int32)
         for used in np.unique(slot):
-            surface[used] = self._of(materials[used])
+            surface[used] = self._of(materials[used], obj)
         return surface[slot]
 
-    def _of(self, material: bpy.types.Material | None) -> int:
-        key = None if material is None else material.name_full
-        if key not in self._index:
-            surface, warnings = (DEFAULT_SURFACE, []) if material is None else read_material(material)
-            self._index[key] = len(self.all)
-            self.all.append(surface)
-            self.warnings += warnings
+    def unread(self, surface: Int32) -> Bool:
+        """Which faces (t,) have a surface that only Cycles can read."""
+        return np.array([isinstance(s, MaterialSurface) and bool(s.unread) for s in self.all])[surface]
+
+    def takes_corner_values(self, surface: Int32) -> bool:
+        """Whether some of the surfaces (t,) take more from the mesh than its shape."""
+        used = [self.all[number] for number in np.unique(surface)]
+        return any(isinstance(s, MaterialSurface) and (s.placement, s.color_attribute) != (None, None) for s in used)
+
+    def sampled(self, surface: Int32, number: int, sampled: Sampled) -> Int32:
+        """The surfaces (t,) with what Cycles found, of the mesh with this number, instead of what was read."""
+        found = np.zeros(len(self.all), np.int32)
+        for own in np.unique(surface):
+            key = ("sampled", number, int(own))
+            if key not in self._index:
+                self._index[key] = len(self.all)
+                glow = 0.0 if sampled.emission is None else 1.0
+                name, textures = self.all[own].name, (sampled.albedo, sampled.emission)
+                self.all.append(Surface(name, (1.0, 1.0, 1.0), (glow, glow, glow), *textures))
+            found[own] = self._index[key]
+        return found[surface]
+
+    def forget_unread(self) -> None:
+        """Take back the warnings of what Cycles has read after all."""
+        unread = {warning for s in self.all if isinstance(s, MaterialSurface) for warning in s.unread}
+        self.warnings = [warning for warning in self.warnings if warning not in unread]
+
+    def _of(self, material: bpy.types.Material | None, obj: bpy.types.Object) -> int:
+        name = None if material is None else material.name_full
+        key = (name, tuple(obj.color)) if (name, "by object") in self._index else (name,)
+        if key in self._index:
+            return self._index[key]
+        surface, warnings = (DEFAULT_SURFACE, []) if material is None else read_material(material, obj.color)
+        if isinstance(surface, MaterialSurface) and surface.by_object:
+            self._index[name, "by object"] = len(self.all)
+            key = (name, tuple(obj.color))
+        self._index[key] = len(self.all)
+        self.all.append(surface)
+        self.warnings += warnings
         return self._index[key]
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..core.result import BakedObject
 from ..core.scene import Float64, Int32
 from . import compat
-from .scene_reader import ReceiverSource
+from .receiver_source import ReceiverSource
 from .slices import Steps, breathe
 
 #: Type of an attribute to the property that holds a value, its numbers, their type, and whether values may be mixed.
