@@ -5,14 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..sampling import GOLDEN, stream
 from ..scene import Bool, Float32, Float64
 from ..visibility import Visibility, offset_along
+from .choice import chances, draw
 from .lamps import Light
 
 #: A light this far under the brightest one at a point, relatively, is not worth a shadow ray there.
 _NEGLIGIBLE = 1e-7
+#: Of more lights than this, each half of the rays asks so many at a point.
+MOST_ASKED = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +27,28 @@ class Illumination:
     irradiance: Float64
     variance: Float64
     signature: np.ndarray
+    rays: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Receivers:
+    """Points where light is asked for: along (3, 3, n), points, normals and shading normals, components first; origins
+    (n, 3) of rays."""
+
+    along: Float32
+    origins: Float32
+
+    def only(self, chosen: NDArray[np.int64]) -> _Receivers:
+        return _Receivers(self.along[:, :, chosen], self.origins[chosen])
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """What ways (r, n) to a light bring: weights, of which so much arrived; free of occluders; rays cast."""
+
+    weights: Float32
+    arrived: Float32
+    free: Bool
     rays: int
 
 
@@ -39,54 +65,112 @@ class DirectLight:
         self, points: Float64, normals: Float64, shading: Float64, rays: int, rng: np.random.Generator
     ) -> Illumination:
         """At points (n, 3) with geometric and shading normals (n, 3), `rays` shadow rays to each sized light."""
-        irradiance, variance = np.zeros((2, len(points), 3))
-        signature = np.zeros(len(points), dtype=np.int64)
-        partly = np.zeros(len(points), dtype=bool)
-        cast = 0
-        origins = offset_along(points, normals)
         along = np.stack([points.T, normals.T, shading.T]).astype(np.float32)
-        for light, name in zip(self.lights, self._names, strict=True):
-            share = light.share(points, shading)
-            lit = np.flatnonzero(share * light.color.max() > _NEGLIGIBLE * irradiance.max(axis=1, initial=0.0))
+        tally = _Tally(_Receivers(along, offset_along(points, normals)))
+        if len(self.lights) <= MOST_ASKED:
+            for light, name in zip(self.lights, self._names, strict=True):
+                share = light.share(points, shading)
+                brightest = tally.irradiance.max(axis=1, initial=0.0)
+                lit = np.flatnonzero(share * light.color.max() > _NEGLIGIBLE * brightest)
+                self._ask(tally, light, name, share[lit], lit, rays, rng)
+        else:
+            self._ask_some(tally, points, shading, rays, rng)
+        return tally.illumination()
+
+    def _ask(
+        self,
+        tally: _Tally,
+        light: Light,
+        name: int,
+        share: Float64,
+        lit: NDArray[np.int64],
+        rays: int,
+        rng: np.random.Generator,
+    ) -> None:
+        """Add what a light of the share (m,) brings to the receivers lit (m,)."""
+        if not len(lit):
+            return
+        # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
+        halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
+        look = self._look(light, tally.receivers.only(lit), _lattices(halves, per_half, len(lit), rng))
+        shape = (halves, per_half, len(lit))
+        seen = _seen(share, look.weights.reshape(shape).mean(axis=1), look.arrived.reshape(shape).mean(axis=1))
+        tally.irradiance[lit] += seen.mean(axis=0)[:, None] * light.color
+        if halves == 2:
+            tally.variance[lit] += ((seen[0] - seen[1])[:, None] * light.color) ** 2 / 4.0
+        whole = look.free.all(axis=0)
+        tally.signature[lit] += np.where(whole, name, 0)
+        tally.partly[lit] |= look.free.any(axis=0) & ~whole
+        tally.rays += look.rays
+
+    def _ask_some(self, tally: _Tally, points: Float64, shading: Float64, rays: int, rng: np.random.Generator) -> None:
+        """Add what all lights bring: the brightest at a point one by one, the others by some of them.
+
+        Each half of the rays draws lights of its own. As with a single light, what the drawn ones would bring with
+        nothing in the way is corrected by what all would bring.
+        """
+        shares = np.stack([light.share(points, shading) for light in self.lights])
+        color = np.stack([light.color for light in self.lights])
+        chance = chances(shares * color.mean(axis=1)[:, None], MOST_ASKED)
+        sure = chance == 1
+        others = np.where(sure, 0.0, chance)
+        drawn = np.stack([draw(others, rng.random(len(points))) for _ in range(2)])
+        arrived, expected = np.zeros((2, 2, len(points), 3))
+        free, asked = np.zeros((2, len(points)), dtype=np.int64)
+        for number, (light, name) in enumerate(zip(self.lights, self._names, strict=True)):
+            lit = np.flatnonzero(sure[number])
+            self._ask(tally, light, name, shares[number, lit], lit, rays, rng)
+            half, lit = np.nonzero(drawn[:, number])
             if not len(lit):
                 continue
-            # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
-            halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
-            unit = _lattices(halves, per_half, len(lit), rng)
-            free, weights, gains = self._look(light, along[:, :, lit], origins[lit], unit)
-            cast += free.size
-            arrived = weights * free if gains is None else weights * gains * free
-            shape = (halves, per_half, len(lit))
-            seen = _seen(share[lit], weights.reshape(shape).mean(axis=1), arrived.reshape(shape).mean(axis=1))
-            irradiance[lit] += seen.mean(axis=0)[:, None] * light.color
-            if halves == 2:
-                variance[lit] += ((seen[0] - seen[1])[:, None] * light.color) ** 2 / 4.0
-            whole = free.all(axis=0)
-            signature[lit] += np.where(whole, name, 0)
-            partly[lit] |= free.any(axis=0) & ~whole
-        signature[partly] = -1
-        return Illumination(irradiance, variance, signature, cast)
+            count = max(1, rays // 2) if light.sized else 1
+            look = self._look(light, tally.receivers.only(lit), _lattices(1, count, len(lit), rng))
+            scale = color[number] / chance[number, lit][:, None]
+            # A way without size brings exactly the share, however its length was rounded.
+            whole = look.weights.mean(axis=0) if light.sized else shares[number, lit]
+            part = look.arrived.mean(axis=0) if light.sized else whole * look.free[0]
+            expected[half, lit] += whole[:, None] * scale
+            arrived[half, lit] += part[:, None] * scale
+            np.add.at(free, lit, look.free.sum(axis=0))
+            np.add.at(asked, lit, count)
+            tally.rays += look.rays
+        every = np.einsum("ln,lk->nk", np.where(sure, 0.0, shares), color)
+        seen = _seen_in_all(every, expected, arrived)
+        tally.irradiance += seen.mean(axis=0)
+        tally.variance += (seen[0] - seen[1]) ** 2 / 4.0
+        tally.partly |= (free > 0) & (free < asked)
 
-    def _look(
-        self, light: Light, along: Float32, origins: Float32, unit: Float32
-    ) -> tuple[Bool, Float32, Float32 | None]:
-        """Which of the ways (r, n) to a light are free, what each counts, and the light's gain along it.
-
-        along (3, 3, n): points, normals and shading normals, components first. Ways that bring nothing count as free,
-        for no ray is cast along them.
-        """
-        points, normals, shading = along
+    def _look(self, light: Light, receivers: _Receivers, unit: Float32) -> _Look:
+        """Look along the ways to a light. Those that bring nothing count as free, for no ray is cast along them."""
+        points, normals, shading = receivers.along
         ways = light.aim(points, unit)
         towards = ways.towards
         weights = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
         gains = light.gain(ways)
-        free = weights == 0 if gains is None else weights * gains == 0
+        brings = weights if gains is None else weights * gains
+        free = brings == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
         above = (towards * normals[:, None]).sum(axis=0) > 0
         sample, point = np.nonzero(above & ~free)
         directions = np.ascontiguousarray(towards[:, sample, point].T)
-        free[sample, point] = self._visibility.unblocked_along(origins[point], directions)
-        return free, weights, gains
+        free[sample, point] = self._visibility.unblocked_along(receivers.origins[point], directions)
+        return _Look(weights, brings * free, free, len(sample))
+
+
+class _Tally:
+    """Illumination while it is added up."""
+
+    def __init__(self, receivers: _Receivers) -> None:
+        count = len(receivers.origins)
+        self.receivers = receivers
+        self.irradiance, self.variance = np.zeros((2, count, 3))
+        self.signature = np.zeros(count, dtype=np.int64)
+        self.partly = np.zeros(count, dtype=bool)
+        self.rays = 0
+
+    def illumination(self) -> Illumination:
+        signature = np.where(self.partly, -1, self.signature)
+        return Illumination(self.irradiance, self.variance, signature, self.rays)
 
 
 def _seen(share: Float64, weights: Float32, arrived: Float32) -> Float64:
@@ -102,6 +186,15 @@ def _seen(share: Float64, weights: Float32, arrived: Float32) -> Float64:
         return share * free
     other = free[::-1].astype(np.float64)
     return other * share + (arrived - other * weights)
+
+
+def _seen_in_all(every: Float64, expected: Float64, arrived: Float64) -> Float64:
+    """The same (h, n, 3) for lights that were drawn by each half: every (n, 3) is what all of them would bring, and so
+    what is expected (h, n, 3) on average, of which so much arrived."""
+    whole = expected.sum(axis=2)
+    free = np.divide(arrived.sum(axis=2), whole, out=np.ones_like(whole), where=whole > 0)
+    other = free[::-1, :, None]
+    return np.asarray(other * every + (arrived - other * expected))
 
 
 def _lattices(halves: int, count: int, points: int, rng: np.random.Generator) -> Float32:

@@ -82,3 +82,12 @@ def all_lamps_together() -> None:
     spot_lamp("Torch", 150.0, COLD, (1.5, -1.5, 2.0), (0.5, 0.3, 0.2), angle=40.0, blend=0.3, radius=0.05)
     sun_lamp("Sun", 0.8, WARM, (-2.0, -2.0, 3.0), (0.0, 0.0, 0.0), angle=2.0)
     area_lamp("Softbox", 40.0, COLD, (0.2, 0.2, 2.2), (0.5, 0.5))
+
+
+@effect_scene("point lamps", "soft shadows")
+def hall_of_two_hundred_lamps() -> None:
+    """All of them matter a little everywhere, and the box hides some from every place."""
+    stage()
+    for k in range(200):
+        x, y = (k % 20) / 19.0 * 3.6 - 1.8, (k // 20) / 9.0 * 3.6 - 1.8
+        point_lamp(f"Bulb {k}", 1.0, WARM if k % 2 else COLD, at=(x, y, 2.0), radius=0.02)
