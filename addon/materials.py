@@ -82,15 +82,10 @@ def read_material(
     return surface, reader.warnings
 
 
-def read_world(world: bpy.types.World | None) -> tuple[RGB, list[str]]:
-    """Radiance of the sky, W/(m^2 sr), and warnings. Without a world Cycles' sky is black."""
-    if world is None:
-        return (0.0, 0.0, 0.0), []
-    tree = shader_tree(world)
-    if tree is None:
-        return _rgb(np.array(world.color)), []
+def read_constant_background(world: bpy.types.World) -> tuple[RGB, list[str]]:
+    """Radiance of a world's nodes, W/(m^2 sr), and warnings unless it is the same everywhere."""
     reader = _TreeReader(f"World '{world.name}'")
-    return _rgb(np.maximum(reader.output(tree).emission, 0.0)), reader.warnings
+    return _rgb(np.maximum(reader.output(world.node_tree).emission, 0.0)), reader.warnings
 
 
 def read_lamp_nodes(lamp: bpy.types.Light) -> tuple[RGB, list[str]]:

@@ -9,14 +9,15 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, Surface
+from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, SkyMap, Surface
 from .copies import copies_of, original_of, place_of
 from .corner_values import corner_colors, corner_uv
 from .lamps import read_lamp
 from .material_samples import MaterialSamples, Sampled
-from .materials import DEFAULT_SURFACE, MaterialSurface, read_material, read_world
+from .materials import DEFAULT_SURFACE, MaterialSurface, read_material
 from .receiver_source import ReceiverSource
 from .render_visibility import rendered_objects, shown_as_rendered
+from .world import read_world
 
 
 def pick_receivers(
@@ -57,6 +58,7 @@ def read_scene(
     rendered = rendered_objects(view_layer)
     for obj in receivers:
         _check_rendered(obj, rendered)
+    world = read_world(depsgraph.scene.world)
     samples = MaterialSamples(depsgraph.scene.frame_current)
     reading = _Reading(set(receivers), rendered, copies_of(view_layer), samples)
     with shown_as_rendered(view_layer):
@@ -68,13 +70,12 @@ def read_scene(
                 with evaluated_mesh(obj.evaluated_get(depsgraph)) as mesh:
                     check_same_corners(obj, mesh)
     reading.take_samples()
-    sky, warnings = read_world(depsgraph.scene_eval.world)
     scene = Scene(
         objects=tuple(reading.objects),
         surfaces=tuple(reading.surfaces.all),
-        lamps=tuple(reading.lamps),
-        sky=sky,
-        warnings=tuple(dict.fromkeys([*reading.warnings, *reading.surfaces.warnings, *warnings])),
+        lamps=(*reading.lamps, *world.suns),
+        sky=world.sky,
+        warnings=tuple(dict.fromkeys([*reading.warnings, *reading.surfaces.warnings, *world.warnings])),
     )
     _check_receivers(receivers, reading.sources)
     _check_light(scene, depsgraph.scene.name)
@@ -392,7 +393,8 @@ def _check_receivers(receivers: Sequence[bpy.types.Object], sources: list[Receiv
 
 def _check_light(scene: Scene, name: str) -> None:
     used = {int(index) for obj in scene.objects for index in np.unique(obj.surface)}
-    if not scene.lamps and not any(scene.sky) and not any(any(scene.surfaces[index].emission) for index in used):
+    shines = isinstance(scene.sky, SkyMap) or any(scene.sky)
+    if not scene.lamps and not shines and not any(any(scene.surfaces[index].emission) for index in used):
         raise SceneError(
             f"Scene '{name}' has no light, so all would be black: add a lamp, give a material emission, or give the "
             "world a colour."

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_baker.addon.materials import read_material, read_world, rough_albedo
+from radiosity_baker.addon.materials import read_material, rough_albedo
 from radiosity_baker.core.scene import ALBEDO_LIMIT
 
 COLOUR = (0.8, 0.4, 0.1, 1.0)
@@ -200,33 +200,6 @@ def test_without_nodes_the_viewport_colour_counts():
 
     assert surface.albedo == COLOUR[:3]
     assert warnings == []
-
-
-def test_the_world_is_colour_times_strength(shader):
-    world = white_sky(shader, colour=(0.2, 0.4, 0.6, 1.0), strength=2.5)
-
-    sky, warnings = read_world(world)
-
-    np.testing.assert_allclose(sky, (0.5, 1.0, 1.5), rtol=1e-6)
-    assert warnings == []
-
-
-def test_a_world_texture_is_named(shader):
-    world = white_sky(shader, colour=(0.2, 0.4, 0.6, 1.0))
-    background = next(
-        node for node in world.node_tree.nodes if node.bl_idname == "ShaderNodeBackground" and node.outputs[0].links
-    )
-    texture = world.node_tree.nodes.new("ShaderNodeTexSky")
-    world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
-
-    sky, warnings = read_world(world)
-
-    np.testing.assert_allclose(sky, (0.2, 0.4, 0.6), rtol=1e-6)
-    assert "World 'Sky' takes its Color from the node Sky Texture" in warnings[0]
-
-
-def test_no_world_is_black():
-    assert read_world(None) == ((0.0, 0.0, 0.0), [])
 
 
 def test_rough_albedo_keeps_its_ends():
