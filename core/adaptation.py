@@ -14,22 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight
-from .direct.lamps import Light
 from .gather import Points, gather_direct, gather_indirect
 from .parallel import Workers
-from .patches import Cells, Patches, PatchMeshes, Space, make_patches, split_objects
-from .plan import Effort
+from .patches import Cells
 from .receivers import Receivers, split_cells
 from .sampling import stream
-from .scene import Bool, Float64, Scene
+from .scene import Bool, Float64
 from .survey import Surroundings, out_of_sight
-from .tessellation import Int64, split_triangles
-from .visibility import Visibility
+from .tessellation import Int64
 
-#: How often a cell, and a patch, is split into four at most.
-LEVELS, PATCH_LEVELS = 4, 3
-#: How far light may jump inside a patch, relative to the mean: what patches send out is blurred by distance.
-_PATCH_STEP = 0.5
+#: How often a cell is split into four at most.
+LEVELS = 4
 #: How far light may jump inside a cell, relative to the mean and to the error asked for: few cells are crossed, and
 #: what the fit leaves of a jump is a fraction of it.
 _BOUNDARY_STEP = 12.0
@@ -97,27 +92,6 @@ class Adaptation:
             fresh, hidden = np.flatnonzero(doubtful[source]), hidden[source]
         return receivers
 
-    def refine_patches(self, scene: Scene, patches: Patches, split: PatchMeshes, limit: int) -> PatchMeshes:
-        """The patch meshes with at most about `limit` triangles, finer where direct light breaks."""
-        for level in range(PATCH_LEVELS):
-            cells = patches.as_cells()
-            own = np.flatnonzero(np.bincount(patches.patch)[patches.patch] == 1)
-            if not len(own):
-                break
-            nowhere = np.zeros(len(cells), dtype=bool)
-            light = self._probe(cells, own, 50 + level, 1, nowhere[own]).direct[0]
-            mean, fair = _fair_share(cells.area[own], light, _PATCH_STEP)
-            chosen = own[self._worst(cells, own, 60 + level, mean, fair, limit, nowhere)[0][own]]
-            if not len(chosen):
-                break
-            marked = np.zeros(sum(len(m.triangles) for m in split.meshes), dtype=bool)
-            marked[patches.triangle[chosen]] = True
-            ends = np.cumsum([len(m.triangles) for m in split.meshes])[:-1]
-            parts = zip(split.meshes, np.split(marked, ends), strict=True)
-            split = replace(split, meshes=tuple(split_triangles(mesh, part)[0] for mesh, part in parts))
-            patches = make_patches(scene, patches.space, split)
-        return split
-
     def _worst(
         self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int, near: Bool
     ) -> tuple[Bool, Bool]:
@@ -127,9 +101,7 @@ class Adaptation:
         if len(fresh):
             probe = self._probe(cells, fresh, number, _POINTS, near[fresh])
             weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
-            # A split cell becomes four, and makes its neighbours become two or three.
-            most = min(max((limit - len(cells)) // 5, 0), int(np.count_nonzero(weight > fair)))
-            split[fresh[np.argsort(-weight, kind="stable")[:most]]] = True
+            split[fresh[largest(weight, fair, limit - len(cells))]] = True
             contact[fresh[probe.contact()]] = True
         return split, split & contact
 
@@ -158,22 +130,18 @@ class Adaptation:
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
 
 
-def patches_by_light(
-    scene: Scene, space: Space, lights: list[Light], effort: Effort, seed: int, workers: Workers
-) -> tuple[Patches, Visibility]:
-    """Patches that are finer where direct light breaks, and what is visible among them."""
-    split = split_objects(scene, effort.patches)
-    patches = make_patches(scene, space, split)
-    adaptation = Adaptation(DirectLight(lights, Visibility(patches.corners), seed), None, seed, workers)
-    patches = make_patches(scene, space, adaptation.refine_patches(scene, patches, split, 2 * effort.patches))
-    return patches, Visibility(patches.corners)
-
-
 def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:
     """Mean of the light (n,), and the squared error times area that is each cell's share when the root mean square
     over all may be `relative` to that mean."""
     mean = float(area @ light / area.sum())
     return mean, (relative * mean) ** 2 * float(area.sum()) / len(area)
+
+
+def largest(weight: Float64, fair: float, room: int) -> Int64:
+    """The items of largest weight (n,), over a fair share, whose split adds about `room` at most: each becomes four,
+    and makes its neighbours become two or three."""
+    most = min(max(room // 5, 0), int(np.count_nonzero(weight > fair)))
+    return np.argsort(-weight, kind="stable")[:most]
 
 
 def _touching(receivers: Receivers, chosen: Bool) -> Bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
-from .adaptation import Adaptation, patches_by_light
+from .adaptation import Adaptation
 from .check import check_scene
 from .clock import Clock
 from .direct.emitters import emitting_panels
@@ -12,6 +12,7 @@ from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .layers import baked_objects
 from .parallel import Workers
+from .patch_refinement import patches_by_light
 from .patches import Patches, make_patches, split_objects, unit_space
 from .plan import Effort, plan
 from .progress import Progress

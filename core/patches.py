@@ -98,16 +98,22 @@ def triangle_geometry(corners: Float64) -> tuple[Float64, Float64]:
 
 @dataclass(frozen=True, eq=False)
 class PatchMeshes:
-    """The objects' triangles split to about the size of a patch: one mesh for each object, and that size in metres."""
+    """The objects' triangles split to about the size of a patch: one mesh for each object, and that size in metres.
+
+    halvings (t,): where an object is denser than patches are, how often the size of a patch is halved at each triangle
+    of all meshes.
+    """
 
     meshes: tuple[Tessellation, ...]
     edge: float
+    halvings: Int64
 
 
 def split_objects(scene: Scene, wanted: int) -> PatchMeshes:
     """Split the triangles of all objects so that about `wanted` of one size would cover them."""
     edge = edge_for_count([o.vertices for o in scene.objects], [o.triangles for o in scene.objects], wanted)
-    return PatchMeshes(tuple(triform(whole(o.vertices, o.triangles), edge) for o in scene.objects), edge)
+    meshes = tuple(triform(whole(o.vertices, o.triangles), edge) for o in scene.objects)
+    return PatchMeshes(meshes, edge, np.zeros(sum(len(m.triangles) for m in meshes), dtype=np.int64))
 
 
 def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
@@ -118,11 +124,10 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     entire = np.concatenate([np.bincount(m.parent)[m.parent] == 1 for m in split.meshes])
     normals, area = triangle_geometry(corners)
     solid = np.flatnonzero(area > 0)
-    edge = split.edge / space.metres
+    edge = split.edge / space.metres / 2.0**split.halvings
     small = solid[(entire & (area < _SMALL * edge * edge / 2))[solid]]
-    alike = np.column_stack(
-        [number, surface, np.floor(corners.mean(axis=1) / (0.8 * edge)), np.rint(normals * 1.5)]
-    ).astype(np.int64)
+    cube = np.floor(corners.mean(axis=1) / (0.8 * edge)[:, None])
+    alike = np.column_stack([number, surface, split.halvings, cube, np.rint(normals * 1.5)]).astype(np.int64)
     patch = group_alike(len(area), small, alike[small])[solid]
     patch = np.unique(patch, return_inverse=True)[1].astype(np.int32)
     members = np.argsort(patch, kind="stable").astype(np.int32)

@@ -112,7 +112,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     asked = settings.error or (0.02 if settings.seconds is None else 0.01)
     finer = min(max(0.02 / asked, 0.25), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" else settings.estimator
-    patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
+    patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
     return Effort(
         error=asked,
         triangles=settings.triangles,

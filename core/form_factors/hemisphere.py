@@ -64,9 +64,8 @@ class Sides:
         return self.patches.emission[self.patch]
 
 
-def site_points(patches: Patches, side: Int32, seed: int, purpose: str) -> tuple[Float64, Float64]:
-    """Points and normals (s, SITES, 3) spread evenly over the area of each side."""
-    shift = stream(seed, "sites " + purpose).random((len(side), 1, 3))
+def site_points(patches: Patches, side: Int32, shift: Float64) -> tuple[Float64, Float64]:
+    """Points and normals (s, SITES, 3) spread evenly over the area of each side, all moved by shift (s, 1, 3)."""
     patch = side % np.int32(len(patches))
     first, last = patches.first[patch, None], patches.first[patch + 1, None]
     cumulative = np.concatenate([[0.0], np.cumsum(patches.area[patches.members])])
@@ -150,7 +149,7 @@ def _look_around(
     light = hemispheres.sky.light
     texels = np.full(len(light), escaped)
     side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [ignored], texels]).astype(np.int32)
-    points, normals = site_points(patches, side, seed, purpose)
+    points, normals = site_points(patches, side, stream(seed, "sites " + purpose).random((len(side), 1, 3)))
 
     def work(number: int, part: slice) -> tuple[Bool, Index, Int32, Index, Index, Float64]:
         rng = stream(seed, "rows " + purpose, number)

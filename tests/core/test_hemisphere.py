@@ -159,7 +159,7 @@ def test_sites_are_spread_over_the_area_of_their_patch(build):
     ball = build.sphere(level=5)
     patches = build.patches(Scene((ball,), SIX), 60)
     sides = np.repeat(np.int32(0), 4000)
-    points, normals = site_points(patches, sides, 0, "test")
+    points, normals = site_points(patches, sides, np.random.default_rng(0).random((len(sides), 1, 3)))
     own = patches.patch == 0
     share = patches.area[own] / patches.area[own].sum()
     centroid = share @ patches.corners[own].mean(axis=1)
@@ -171,7 +171,7 @@ def test_sites_are_spread_over_the_area_of_their_patch(build):
 
 def test_sites_of_a_back_face_the_other_way(build):
     patches = build.patches(Scene((build.quad(),), SIX), 2)
-    _, normals = site_points(patches, np.array([0, 2], dtype=np.int32), 0, "test")
+    _, normals = site_points(patches, np.array([0, 2], dtype=np.int32), np.random.default_rng(0).random((2, 1, 3)))
     assert normals[0, 0].tolist() == [0, 0, 1]
     assert normals[1, 0].tolist() == [0, 0, -1]
 

@@ -1,12 +1,12 @@
-"""Cells and patches get finer where light breaks, and nowhere else."""
+"""Patches get finer where light varies inside them, and nowhere else."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from radiosity_baker.core.adaptation import patches_by_light
 from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.patch_refinement import patches_by_light
 from radiosity_baker.core.patches import unit_space
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 
@@ -50,3 +50,25 @@ def test_finer_patches_cover_the_same(build, workers):
 def test_a_mesh_of_which_all_patches_are_groups(build, workers):
     patches = by_light(build, workers, build.sphere(level=6), wanted=30)
     assert len(patches) < 300
+
+
+def test_patches_are_finer_where_a_lamp_is_near(build, workers):
+    """No shadow falls on the floor; but under the lamp the light changes within a patch."""
+    lamp = PointLamp("lamp", (0, 0, 0.15), (1.0, 1.0, 1.0))
+    floor = build.quad("floor", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    patches = by_light(build, workers, floor, lamps=(lamp,))
+    away = np.linalg.norm(patches.corners.mean(axis=1)[:, :2], axis=1) * patches.space.metres
+    assert np.median(patches.area[away < 0.1]) <= patches.area.max() / 4
+    assert patches.area[away > 1.5].min() == pytest.approx(patches.area.max())
+
+
+def test_groups_are_finer_where_a_lamp_is_near(build, workers):
+    """A lamp inside a dense ball, near one side of it: the light is inside, on the backs of the triangles."""
+    lamp = PointLamp("lamp", (0, 0, 0.9), (1.0, 1.0, 1.0))
+    ball = build.sphere(level=5)
+    even = by_light(build, workers, ball, lamps=(), wanted=100)
+    patches = by_light(build, workers, ball, lamps=(lamp,), wanted=100)
+    height = np.full(len(patches), -1.0)
+    np.maximum.at(height, patches.patch, patches.corners[..., 2].mean(axis=1))
+    assert len(patches) > len(even)
+    assert np.median(patches.patch_area[height > 0.9]) < 0.5 * np.median(patches.patch_area[height < 0])
