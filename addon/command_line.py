@@ -21,6 +21,7 @@ import bpy
 import numpy as np
 
 from ..core import self_test
+from ..core.effects import EFFECTS
 from ..core.ladder import QUICK, Scale
 from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
@@ -126,7 +127,8 @@ def _plan(options: argparse.Namespace, progress: Progress) -> None:
     progress.check()
     outlook = plan(scene, settings)
     for effect in outlook.effects:
-        print(f"{'on ' if effect.active else 'off'}  {effect.name}: {effect.reason}")
+        cost = f" (about {outlook.costs[effect.name]:.2f} s)" if effect.name in outlook.costs else ""
+        print(f"{'on ' if effect.active else 'off'}  {effect.name}: {effect.reason}{cost}")
     for warning in scene.warnings:
         print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
     print(f"About {outlook.seconds:.1f} s and {outlook.memory_mb:,.0f} MB.")
@@ -220,6 +222,7 @@ def _settings(options: argparse.Namespace) -> Settings:
         seed=options.seed,
         threads=options.threads,
         layers=options.layers,
+        effects=dict.fromkeys(options.with_, True) | dict.fromkeys(options.without, False),
         **asked,
     )
 
@@ -381,6 +384,10 @@ def _add_scene_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"that would cover the objects, before shadow edges are split finer ({Settings.triangles:,})",
     )
     fineness.add_argument("--size", type=_positive, metavar="METRES", help="longest edge of a triangle to use instead")
+    parser.add_argument("--with", dest="with_", type=_effects, default=[], metavar="A,B", help="effects to simulate")
+    parser.add_argument(
+        "--without", type=_effects, default=[], metavar="A,B", help=f"effects to leave out, of: {', '.join(EFFECTS)}"
+    )
     layers = f"besides combined, any of {', '.join(layer for layer in LAYERS if layer != 'combined')}"
     parser.add_argument("--layers", type=_layers, default=Settings.layers, metavar="A,B", help=layers)
 
@@ -397,6 +404,14 @@ def _file(suffix: str) -> Callable[[str], Path]:
 
 def _names(text: str) -> list[str]:
     return [name.strip() for name in text.split(",") if name.strip()]
+
+
+def _effects(text: str) -> list[str]:
+    names = _names(text)
+    for name in names:
+        if name not in EFFECTS:
+            raise argparse.ArgumentTypeError(f"unknown effect '{name}': choose from {', '.join(EFFECTS)}")
+    return names
 
 
 def _layers(text: str) -> tuple[str, ...]:

@@ -35,6 +35,11 @@ def lamp_strength(lamp: bpy.types.Light, matrix: Float64) -> RGB:
     return (float(strength[0]), float(strength[1]), float(strength[2]))
 
 
+def casts_shadow(lamp: bpy.types.Light) -> bool:
+    """Whether Cycles lets anything stand in the lamp's light: a setting of Cycles' own at first, of the lamp later."""
+    return bool(getattr(getattr(lamp, "cycles", None), "cast_shadow", lamp.use_shadow))
+
+
 def set_corner_normals(mesh: bpy.types.Mesh, normals: Float32) -> None:
     """Give every corner its shading normal, (l, 3) unit vectors.
 

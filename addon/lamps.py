@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ..core.scene import RGB, AreaLamp, Float64, Lamp, PointLamp, SpotLamp, SunLamp, Vector
-from .compat import lamp_strength
+from .compat import casts_shadow, lamp_strength
 from .materials import read_lamp_nodes
 
 #: An area lamp's beam is at least this wide (radians): Cycles' exactly parallel beam has no radiance to speak of.
@@ -39,9 +40,16 @@ def read_lamp(name: str, lamp: bpy.types.Light, matrix: Float64) -> tuple[Lamp |
     if lamp.type != "POINT" and np.linalg.det(matrix[:3, :3]) == 0.0:
         warnings.append(f"Lamp '{name}' is scaled to nothing along an axis: it is left out. Give it a scale of 1.")
         return None, warnings
-    if not lamp.use_shadow:
-        warnings.append(f"Lamp '{name}' casts no shadows in Blender, but does so in the bake.")
-    return READERS[lamp.type](name, lamp, matrix, strength, warnings), warnings
+    read = READERS[lamp.type](name, lamp, matrix, strength, warnings)
+    return read and replace(read, casts_shadow=casts_shadow(lamp)), warnings
+
+
+def warn_of_linking(name: str, obj: bpy.types.Object) -> list[str]:
+    """Warnings where an object shines on, or is shadowed by, some objects only."""
+    linking = getattr(obj, "light_linking", None)
+    if linking is None or not (linking.receiver_collection or linking.blocker_collection):
+        return []
+    return [f"Light linking of '{name}' is not baked: it shines on everything, and everything stands in its light."]
 
 
 def _point(name: str, lamp: bpy.types.PointLight, matrix: Float64, strength: Float64, _: list[str]) -> PointLamp:

@@ -12,7 +12,7 @@ import numpy as np
 from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, SkyMap, Surface
 from .copies import copies_of, original_of, place_of
 from .corner_values import corner_colors, corner_uv
-from .lamps import read_lamp
+from .lamps import read_lamp, warn_of_linking
 from .material_samples import MaterialSamples, Sampled
 from .materials import DEFAULT_SURFACE, MaterialSurface, read_material
 from .receiver_source import ReceiverSource
@@ -138,7 +138,7 @@ class _Reading:
                 self._add_mesh(instance, name, matrix)
             elif obj.visible_diffuse:
                 lamp, warnings = read_lamp(name, obj.data, matrix)
-                self.warnings += warnings
+                self.warnings += warnings + warn_of_linking(name, obj)
                 self.lamps += [lamp] if lamp is not None else []
 
     def _place(self, instance: bpy.types.DepsgraphObjectInstance) -> Float64:
@@ -152,6 +152,7 @@ class _Reading:
         receives = not instance.is_instance and obj.original in self.receivers
         if not (receives or obj.visible_diffuse or obj.visible_shadow):
             return
+        self.warnings += warn_of_linking(name, obj)
         if not (obj.visible_diffuse and obj.visible_shadow):
             self.warnings.append(
                 f"Object '{name}' is visible to some rays only (Ray Visibility): all see it in the bake."

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .convexity import nothing_stands_between
 from .patches import triangle_geometry
 from .result import Effect
 from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp
@@ -22,6 +23,8 @@ from .textures import triangle_colours, varying_albedo, varying_emission
 
 #: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
 MOST_PANELS = 64
+#: Each kind of lamp, by the name of its effect.
+LAMPS: dict[str, type] = {"point lamps": PointLamp, "spot lamps": SpotLamp, "sun": SunLamp, "area lamps": AreaLamp}
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,14 @@ def soft_shadows(scene: Scene, _: Settings) -> Effect:
     return Effect("soft shadows", True, f"{_names(soft)} {'has' if len(soft) == 1 else 'have'} a size")
 
 
+def shadows(scene: Scene, _: Settings) -> Effect:
+    if not any(lamp.casts_shadow for lamp in scene.lamps):
+        return Effect("shadows", False, "no lamp casts any")
+    if nothing_stands_between(scene):
+        return Effect("shadows", False, "nothing can stand between the lamps and the surfaces: all lie around them")
+    return Effect("shadows", True, "surfaces may stand in the light of lamps")
+
+
 def emitting_surfaces(scene: Scene, _: Settings) -> Effect:
     emitting = emitting_triangles(scene)
     if not emitting:
@@ -100,7 +111,8 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
         return Effect("bounces", True, "as the original program did: centroid form factors, plain shooting")
     mean = _mean_albedo(scene)
     matter = max(1, ceil(log(0.002) / log(mean))) if 0 < mean < 1 else 1
-    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter")
+    rest = f"the next adds at most {mean ** (matter + 1):.2%} in a closed room"
+    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter, {rest}")
 
 
 def albedo_textures(scene: Scene, _: Settings) -> Effect:
@@ -170,6 +182,10 @@ def _with_hard_shadows(scene: Scene) -> Scene:
     return replace(scene, lamps=tuple(hard(lamp) for lamp in scene.lamps))
 
 
+def _without_shadows(scene: Scene) -> Scene:
+    return replace(scene, lamps=tuple(replace(lamp, casts_shadow=False) for lamp in scene.lamps))
+
+
 def _without_emission(scene: Scene) -> Scene:
     return replace(scene, surfaces=tuple(replace(s, emission=(0.0, 0.0, 0.0)) for s in scene.surfaces))
 
@@ -212,6 +228,7 @@ EFFECTS: dict[str, Rule] = {
     "spot lamps": Rule(spot_lamps, _without_lamps(SpotLamp)),
     "sun": Rule(sun, _without_lamps(SunLamp)),
     "area lamps": Rule(area_lamps, _without_lamps(AreaLamp)),
+    "shadows": Rule(shadows, _without_shadows),
     "soft shadows": Rule(soft_shadows, _with_hard_shadows),
     "emitting surfaces": Rule(emitting_surfaces, _without_emission),
     "sky": Rule(sky, _without_sky),

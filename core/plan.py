@@ -8,7 +8,8 @@ from time import perf_counter
 import numpy as np
 
 from .direct.emitters import emitting_pieces
-from .effects import MOST_PANELS, choose_effects, emitting_triangles
+from .direct.illumination import MOST_ASKED
+from .effects import LAMPS, MOST_PANELS, choose_effects, emitting_triangles
 from .parallel import Workers, thread_count
 from .patches import Space, make_patches, split_objects, unit_space
 from .progress import Progress
@@ -21,6 +22,8 @@ from .visibility import Visibility
 
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky", "emitting surfaces")
+#: What no single effect costs: points, fit and layers.
+REST = "the rest"
 #: Triangles and patches below which a bake shows next to nothing.
 _FEWEST = 1500
 #: Rays that measure how fast this machine traces this scene.
@@ -60,12 +63,13 @@ class Effort:
 @dataclass(frozen=True)
 class Plan:
     """scene: with nothing in it but the effects that are simulated; effects with their reasons; how hard to work; the
-    cost predicted from a short calibration of this machine."""
+    cost predicted from a short calibration of this machine: costs, seconds by effect and of all together (REST)."""
 
     scene: Scene
     effects: tuple[Effect, ...]
     effort: Effort
     cells: int
+    costs: dict[str, float]
     seconds: float
     memory_mb: float
 
@@ -102,9 +106,9 @@ def _priced(scene: Scene, settings: Settings, effects: tuple[Effect, ...], effor
     receivers = scene.receivers()
     vertices, triangles = [o.vertices for o in receivers], [o.triangles for o in receivers]
     edge = settings.size or edge_for_count(vertices, triangles, effort.triangles)
-    unpriced = Plan(scene, effects, effort, predicted_count(vertices, triangles, edge), 0.0, 0.0)
-    seconds, memory = predict(scene, settings, unpriced)
-    return replace(unpriced, seconds=seconds, memory_mb=memory)
+    unpriced = Plan(scene, effects, effort, predicted_count(vertices, triangles, edge), {}, 0.0, 0.0)
+    costs, memory = predict(scene, settings, unpriced)
+    return replace(unpriced, costs=costs, seconds=sum(costs.values()), memory_mb=memory)
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
@@ -130,19 +134,26 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     )
 
 
-def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[float, float]:
-    """Seconds and peak MB of the bake, from how long a few rays take here and now."""
+def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[dict[str, float], float]:
+    """Seconds by effect (those of REST serve all), and peak MB of the bake, from how long a few rays take here."""
     effort, cells = unpriced.effort, unpriced.cells
     sides = 1.2 * effort.patches if unpriced.looks_around else 0
-    lights = len(scene.lamps) + len(emitting_pieces(scene))
-    around = 2 * sides * effort.transport_rays
+    work = dict.fromkeys((*(kind for kind in LAMPS), "emitting surfaces"), 0.0)
+    per_light = _SHADOW_COST * effort.shadow_rays * (cells * (effort.passes + 3) + 16 * sides)
+    pieces = len(emitting_pieces(scene))
+    asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces, 1))
+    for name, kind in LAMPS.items():
+        work[name] = asked * per_light * sum(isinstance(lamp, kind) for lamp in scene.lamps)
+    work["emitting surfaces"] = asked * per_light * pieces
     if unpriced.looks_around:
-        around += cells * effort.passes * effort.gather_rays
-    shadow = lights * effort.shadow_rays * (cells * (effort.passes + 3) + 16 * sides)
-    work = around * _RAY_COST + shadow * _SHADOW_COST + cells * _CELL_COST + sides * _SIDE_COST
-    seconds = work * _seconds_per_ray(scene, unit_space(scene), thread_count(settings.threads))
+        around = 2 * sides * effort.transport_rays + cells * effort.passes * effort.gather_rays
+        # One look serves all that it may meet: it counts for the first of them.
+        first = next(name for name in LOOKING if unpriced.active(name))
+        work[first] = work.get(first, 0.0) + around * _RAY_COST + sides * _SIDE_COST
+    work[REST] = cells * _CELL_COST
+    per_ray = _seconds_per_ray(scene, unit_space(scene), thread_count(settings.threads))
     memory = (_BYTES_AT_REST + cells * _BYTES_PER_CELL + sides * _BYTES_PER_SIDE) / 1e6
-    return seconds, memory
+    return {name: amount * per_ray for name, amount in work.items() if amount > 0}, memory
 
 
 def _seconds_per_ray(scene: Scene, space: Space, threads: int) -> float:

@@ -106,7 +106,7 @@ class PointLamp:
 
     intensity: W/sr per channel, total over the ball. radius: metres; 0 is a point, with irradiance I cos / d^2.
     facing_disc: the lamp is a disc of that radius that turns to each receiver (Blender's "soft falloff") rather than a
-    sphere. Either has the radiance I / (pi radius^2).
+    sphere. Either has the radiance I / (pi radius^2). casts_shadow: False shines through everything, as of all lamps.
     """
 
     name: str
@@ -114,6 +114,7 @@ class PointLamp:
     intensity: RGB
     radius: float = 0.0
     facing_disc: bool = True
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,7 @@ class SpotLamp:
     blend: float
     radius: float = 0.0
     facing_disc: bool = True
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True)
@@ -148,6 +150,7 @@ class SunLamp:
     direction: Vector
     irradiance: RGB
     angle: float = 0.0
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True)
@@ -169,6 +172,7 @@ class AreaLamp:
     radiance: RGB
     shape: Literal["rectangle", "ellipse"] = "rectangle"
     spread: float = np.pi
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True, eq=False)

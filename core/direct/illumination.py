@@ -151,6 +151,8 @@ class DirectLight:
         free = brings == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
         above = (towards * normals[:, None]).sum(axis=0) > 0
+        if not light.casts_shadow:
+            free |= above
         sample, point = np.nonzero(above & ~free)
         directions = np.ascontiguousarray(towards[:, sample, point].T)
         free[sample, point] = self._visibility.unblocked_along(receivers.origins[point], directions)

@@ -45,11 +45,13 @@ class Ways:
 
 
 class Light(Protocol):
-    """A light source in the unit box. color (3,) float64. sized: whether its shadows are soft."""
+    """A light source in the unit box. color (3,) float64. sized: whether its shadows are soft; casts_shadow: whether
+    it has any."""
 
     name: str
     color: Float64
     sized: bool
+    casts_shadow: bool
 
     def share(self, points: Float64, normals: Float64) -> Float64: ...
 
@@ -105,6 +107,7 @@ class Ball:
         self.facing_disc = lamp.facing_disc
         self.color = np.array(lamp.intensity) / space.metres**2
         self.sized = self.radius > 0
+        self.casts_shadow = lamp.casts_shadow
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         towards = self.position - points
@@ -182,6 +185,7 @@ class Sun:
         self.axis = -np.array(lamp.direction) / np.linalg.norm(lamp.direction)
         self.tangent = np.tan(min(lamp.angle, 0.999 * np.pi) / 2)
         self.sized = bool(self.tangent > 1e-6)
+        self.casts_shadow = lamp.casts_shadow
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         cosine = normals @ self.axis
@@ -222,6 +226,7 @@ class Panel:
         two_sided: bool,
         spread: float = np.pi,
         ellipse: tuple[Float64, Float64, Float64] | None = None,
+        casts_shadow: bool = True,
     ) -> None:
         self.name = name
         self.corners = corners
@@ -229,6 +234,7 @@ class Panel:
         self.two_sided = two_sided
         self.half_spread = spread / 2
         self.sized = True
+        self.casts_shadow = casts_shadow
         fan = np.cross(corners[1:-1] - corners[0], corners[2:] - corners[0]).sum(axis=0)
         self.area = float(np.linalg.norm(fan)) / 2
         self.normal = fan / np.linalg.norm(fan)
@@ -255,7 +261,15 @@ class Panel:
             outline = outline[::-1]
         corners = center + outline @ np.stack([half_u, half_v])
         radiance = np.array(lamp.radiance)
-        return cls(lamp.name, corners, radiance, two_sided=False, spread=lamp.spread, ellipse=ellipse)
+        return cls(
+            lamp.name,
+            corners,
+            radiance,
+            two_sided=False,
+            spread=lamp.spread,
+            ellipse=ellipse,
+            casts_shadow=lamp.casts_shadow,
+        )
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         return polygon_irradiance(points, normals, self.corners, two_sided=self.two_sided)

@@ -264,8 +264,22 @@ def test_the_plan_names_effects_reasons_and_cost(scene_file: Path, out: Path, ca
     said = capsys.readouterr().out
     assert re.search(r"^on +point lamps: .*Lamp", said, re.MULTILINE)
     assert re.search(r"^off +sky: ", said, re.MULTILINE)
+    assert re.search(r"^on +point lamps: .*\(about [\d.]+ s\)$", said, re.MULTILINE)
     assert re.search(r"^About [\d.]+ s and [\d,]+ MB\.$", said, re.MULTILINE)
     assert main(["plan", str(out / "none.blend")]) == 2
+
+
+def test_effects_are_switched_by_name(scene_file: Path, capsys):
+    assert main(["plan", str(scene_file), "--without", "point lamps,bounces", "--with", "sky"]) == 0
+    said = capsys.readouterr().out
+    for line in (
+        "off  point lamps: switched off by hand",
+        "off  bounces: switched off",
+        "on   sky: switched on by hand",
+    ):
+        assert line in said
+    assert main(["plan", str(scene_file), "--without", "moon"]) == 2
+    assert "unknown effect 'moon': choose from point lamps" in capsys.readouterr().err
 
 
 def test_without_a_file_or_a_command_it_says_so(out: Path, capsys):

@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 import pytest
 
-from radiosity_baker.addon.lamps import NARROWEST_SPREAD, read_lamp
+from radiosity_baker.addon.lamps import NARROWEST_SPREAD, read_lamp, warn_of_linking
 from radiosity_baker.core.scene import AreaLamp, PointLamp, SpotLamp, SunLamp
 
 POINTS = np.array([[0.01, 0.0, 0.0], [1.0, 0.0, 0.0], [0.3, 0.4, 1.2], [2.0, 0.5, 1.0], [-0.5, 1.5, 0.3]])
@@ -232,10 +232,30 @@ def test_a_portal_is_no_lamp(add_lamp):
     assert read_lamp("Portal", obj.data, np.eye(4)) == (None, [])
 
 
-def test_a_lamp_without_shadows_is_named(add_lamp):
-    obj = add_lamp("POINT", {"energy": 10.0, "use_shadow": False})
+def test_a_lamp_without_shadows_shines_through_everything(add_lamp, add_mesh, cycles_irradiance):
+    """As Cycles has it, and as the closed form without a roof."""
+    obj = add_lamp("POINT", {"energy": 10.0, "use_shadow": False, "shadow_soft_size": 0.0}, location=(0, 0, 2))
+    lamp, warnings = read_lamp("Fill", obj.data, np.array(obj.matrix_world))
+    assert not lamp.casts_shadow
+    assert warnings == []
+    add_mesh("Roof", vertices=((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)))
+    seen = cycles_irradiance([(0.0, 0.0, 0.0)], [(0.0, 0.0, 1.0)])
+    assert seen[0] == pytest.approx(10.0 / (4.0 * np.pi) / 4.0, rel=1e-3)
 
-    _, warnings = read_lamp("Fill", obj.data, np.eye(4))
 
+def test_light_linking_is_warned_of_by_name(add_lamp):
+    obj = add_lamp("POINT")
+    assert warn_of_linking("Key", obj) == []
+    obj.light_linking.receiver_collection = bpy.data.collections.new("Only these")
+    assert "'Key'" in warn_of_linking("Key", obj)[0]
+
+
+@pytest.mark.parametrize("kind", ["ShaderNodeTexIES", "ShaderNodeLightFalloff"])
+def test_what_shapes_a_lamps_light_and_is_not_read_is_warned_of_by_name(add_lamp, shader, kind):
+    obj = add_lamp("POINT", {"energy": 10.0})
+    emission = shader(obj.data, "ShaderNodeEmission", Strength=1.0)
+    tree = obj.data.node_tree
+    tree.links.new(tree.nodes.new(kind).outputs[0], emission.inputs["Strength"])
+    _, warnings = read_lamp("Lamp", obj.data, np.eye(4))
     assert len(warnings) == 1
-    assert "'Fill' casts no shadows" in warnings[0]
+    assert f"'{obj.data.name}'" in warnings[0]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.convexity import nothing_stands_between
 from radiosity_baker.core.effects import EFFECTS, choose_effects
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp, Surface, Texture
 from radiosity_baker.core.settings import Settings
@@ -50,7 +51,7 @@ def test_an_effect_that_is_switched_off_is_off_and_says_by_whom(everything, name
 
 
 def test_without_all_sources_the_scene_is_dark(everything):
-    sources = [name for name in EFFECTS if name not in ("bounces", "soft shadows")]
+    sources = [name for name in EFFECTS if name not in ("bounces", "shadows", "soft shadows")]
     assert light(everything, effects=dict.fromkeys(sources, False)).max() == 0
 
 
@@ -96,3 +97,52 @@ def test_without_overrides_nothing_changes(everything):
     _, scene = choose_effects(everything, Settings())
     assert scene is everything
     assert np.array_equal(light(everything), light(everything, effects={"sky": True}))
+
+
+def room(build, **changes):
+    """A closed box of one metre with a lamp in the middle: convex, so nothing can stand between."""
+    lamp = PointLamp("bulb", (0.4, 0.5, 0.6), COLOR, **changes)
+    return Scene((build.box(inward=True),), (build.grey,), (lamp,))
+
+
+def test_a_convex_room_needs_no_shadow_ray(build):
+    """And shadows switched on change nothing: no ray is ever blocked."""
+    scene = room(build, radius=0.1)
+    without, forced = (bake(scene, replace(QUICK, effects=asked)) for asked in ({}, {"shadows": True}))
+    assert not next(e for e in without.report.effects if e.name == "shadows").active
+    assert without.report.rays.get("shadow", 0) == 0
+    assert forced.report.rays["shadow"] > 0
+    shown, same = (r.objects[0].layers["combined"] for r in (without, forced))
+    assert shown == pytest.approx(same, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    "lamp",
+    [
+        PointLamp("outside", (2, 0.5, 0.5), COLOR),
+        PointLamp("half outside", (0.9, 0.5, 0.5), COLOR, radius=0.2),
+        SunLamp("noon", (0, 0, -1), COLOR),
+        AreaLamp("through the wall", (0.9, 0.5, 0.5), (0.2, 0, 0), (0, 0.2, 0), (0, 0, -1), COLOR),
+    ],
+)
+def test_a_lamp_that_is_not_within_the_room_casts_shadows(build, lamp):
+    assert not nothing_stands_between(replace(room(build), lamps=(lamp,)))
+
+
+def test_a_sun_over_a_floor_has_nothing_in_its_way_and_behind_a_box_it_has(build):
+    noon = SunLamp("noon", (0.1, 0, -1), COLOR, angle=0.1)
+    floor = build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    assert nothing_stands_between(Scene((floor,), (build.grey,), (noon,)))
+    standing = build.box("box", (-0.2, -0.2, 0), (0.2, 0.2, 0.5))
+    assert not nothing_stands_between(Scene((floor, standing), (build.grey,), (noon,)))
+
+
+def test_lamps_that_cast_no_shadow_shine_through(build):
+    roof = build.quad("roof", (-1, -1, 1), (2, 0, 0), (0, 2, 0), receives=False)
+    floor = build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    black = Surface("black", (0.5, 0, 0))
+    lamp = PointLamp("bulb", (0, 0, 2), COLOR)
+    dark = light(Scene((floor, roof), (black,), (lamp,)))[..., 0]
+    through = light(Scene((floor, roof), (black,), (replace(lamp, casts_shadow=False),)))[..., 0]
+    assert dark.max() < 0.01 * through.max()
+    assert through.min() > 0

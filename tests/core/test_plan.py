@@ -114,7 +114,8 @@ def test_nothing_looks_around_where_nothing_is_to_be_seen(ground):
 
 def test_effects_that_are_off_cast_no_ray(ground):
     black = replace(ground, surfaces=(Surface("black", (0, 0, 0)),), lamps=(LAMPS["point lamps"],))
-    rays = bake(black, Settings(triangles=50, error=0.08, threads=1)).report.rays
+    asked = Settings(triangles=50, error=0.08, threads=1, effects={"shadows": True})
+    rays = bake(black, asked).report.rays
     assert rays.get("gather", 0) == rays.get("transport", 0) == 0
     assert rays["shadow"] > 0
     no_lamps = replace(ground, sky=COLOR)
