@@ -145,7 +145,9 @@ def settings():
 
 def running():
     """Is there a bake in the window, be it at work or waiting to write?"""
-    return job() is not None or "OBJECT_OT_radiosity_bake" in [each.bl_idname for each in bpy.context.window.modal_operators]
+    return job() is not None or "OBJECT_OT_radiosity_bake" in [
+        each.bl_idname for each in bpy.context.window.modal_operators
+    ]
 
 
 def open_tab():
