@@ -51,9 +51,11 @@ def of_findings(found: Iterable[Finding]) -> list[Problem]:
     for finding in found:
         by_kind.setdefault(finding.kind, []).append(finding)
     return [
-        Problem(kind, _SAID[kind](", ".join(f.name for f in group), sum(f.count for f in group)), tuple(
-            f.name for f in group
-        ))
+        Problem(
+            kind,
+            _SAID[kind](", ".join(f.name for f in group), sum(f.count for f in group)),
+            tuple(f.name for f in group),
+        )
         for kind, group in by_kind.items()
     ]
 
@@ -98,13 +100,19 @@ def _changes_faces(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
 
 
 _SAID: dict[str, Callable[[str, int], str]] = {
-    "mixed winding": lambda names, n: f"Neighbouring faces look to different sides ({names}): {wording.count('triangle', n)}",
-    "inside out": lambda names, _: f"Faces look inward ({names}), and what sees only backs counts as inside and is dark",
+    "mixed winding": lambda names, n: (
+        f"Neighbouring faces look to different sides ({names}): {wording.count('triangle', n)}"
+    ),
+    "inside out": lambda names, _: (
+        f"Faces look inward ({names}), and what sees only backs counts as inside and is dark"
+    ),
     "duplicate faces": lambda names, n: f"Faces lie exactly on others ({names}): {wording.count('triangle', n)}",
     "zero area": lambda names, n: f"Faces have no area ({names}): {wording.count('triangle', n)}",
     "albedo": lambda names, _: f"Materials reflect all light or more ({names}), which nothing real does",
-    "coarse": lambda names, n: f"Faces are larger than lamps are far ({names}): {wording.count('triangle', n)} that cannot "
-    "show the light between their corners",
+    "coarse": lambda names, n: (
+        f"Faces are larger than lamps are far ({names}): {wording.count('triangle', n)} that cannot "
+        "show the light between their corners"
+    ),
 }
 
 

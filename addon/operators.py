@@ -8,19 +8,23 @@ these ticks, so a cancelled bake has touched nothing, and one undo step takes a 
 import json
 import traceback
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
 
+from ..core.lint import findings
 from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import bake_scene, panels, scene_reader, viewport, wording
+from . import bake_scene, checklist, panels, scene_reader, viewport, wording
 from .job import BakeJob
 from .window_bake import WindowBake
+
+#: Errors whose cost is told beforehand.
+ERRORS = (0.05, 0.02, 0.01, 0.005)
 
 
 class OBJECT_OT_radiosity_bake(bpy.types.Operator):
@@ -105,8 +109,11 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
 
 class OBJECT_OT_radiosity_plan(bpy.types.Operator):
     bl_idname = "object.radiosity_plan"
-    bl_label = "Plan Bake"
-    bl_description = "Find out which effects of light this scene calls for, and what the bake would cost"
+    bl_label = "Check and Plan"
+    bl_description = (
+        "Find out what stands in the way of a good bake, which effects of light this scene calls for, and what the "
+        "bake would cost"
+    )
     bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
 
     @classmethod
@@ -132,18 +139,62 @@ class OBJECT_OT_radiosity_switch_effect(bpy.types.Operator):
 
 
 def _plan(context: bpy.types.Context) -> None:
+    """Look at the scene and keep what there is to say of it in the settings, where drawing it costs nothing."""
     asked = context.scene.radiosity_baker
-    settings = asked.to_core()
+    settings, mode = asked.to_core(), asked.result_mode()
     receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
-    scene, _ = scene_reader.read_scene(context.evaluated_depsgraph_get(), receivers, tessellate=settings.tessellate)
-    planned = plan(scene, settings)
-    asked.plan = json.dumps(
-        {
+    depsgraph = context.evaluated_depsgraph_get()
+    problems = checklist.of_objects(receivers, mode, depsgraph)
+    told: dict[str, object] = {}
+    try:
+        # What refuses the asked result is named already, and not to hide the rest.
+        scene, _ = scene_reader.read_scene(depsgraph, receivers, tessellate=settings.tessellate or bool(problems))
+    except scene_reader.NoLightError:
+        problems.append(checklist.no_light())
+    else:
+        planned = plan(scene, settings)
+        problems += checklist.of_findings(findings(scene, kept=mode == "keep")) + checklist.of_plan(planned)
+        told = {
             "seconds": planned.seconds,
             "memory_mb": planned.memory_mb,
             "effects": [asdict(effect) for effect in planned.effects],
+            "costs": [[error, plan(scene, replace(settings, error=error, seconds=None)).seconds] for error in ERRORS],
         }
-    )
+    asked.plan = json.dumps(told | {"problems": [asdict(problem) for problem in problems]})
+
+
+class OBJECT_OT_radiosity_fix(bpy.types.Operator):
+    bl_idname = "object.radiosity_fix"
+    bl_label = "Fix"
+    bl_description = "Mend this, as an ordinary edit that can be undone"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO", "INTERNAL"}
+
+    number: bpy.props.IntProperty(options={"HIDDEN"})
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_bake(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        problems = context.scene.radiosity_baker.problems()
+        if not 0 <= self.number < len(problems):
+            return {"CANCELLED"}
+        checklist.fix(context, problems[self.number])
+        return _attempt(self, lambda: _plan(context))
+
+
+class OBJECT_OT_radiosity_accuracy(bpy.types.Operator):
+    bl_idname = "object.radiosity_accuracy"
+    bl_label = "Choose Accuracy"
+    bl_description = "Bake for this error"
+    bl_options: ClassVar[set[str]] = {"INTERNAL", "UNDO"}
+
+    percent: bpy.props.FloatProperty(options={"HIDDEN"})
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        asked = context.scene.radiosity_baker
+        asked.goal, asked.error = "ERROR", self.percent
+        return {"FINISHED"}
 
 
 def _attempt(operator: bpy.types.Operator, action: Callable[[], set[str] | None]) -> set[str]:
@@ -228,6 +279,8 @@ OPERATORS = (
     OBJECT_OT_radiosity_keep,
     OBJECT_OT_radiosity_plan,
     OBJECT_OT_radiosity_switch_effect,
+    OBJECT_OT_radiosity_fix,
+    OBJECT_OT_radiosity_accuracy,
 )
 
 

@@ -10,6 +10,7 @@ from typing import ClassVar
 import bpy
 
 from . import viewport
+from .checklist import FIXES
 from .job import BakeJob
 from .wording import count, energy_line, error_causes, percent, stage, time_line
 
@@ -86,16 +87,28 @@ class LastBakeSection:
 
 
 class PlanSection:
-    bl_label = "Plan"
+    bl_label = "Check and Plan"
     bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, plan = self.layout, context.scene.radiosity_baker.last_plan()
+        settings, layout = context.scene.radiosity_baker, self.layout
+        plan = settings.last_plan()
         layout.operator("object.radiosity_plan", icon="VIEWZOOM")
+        for number, problem in enumerate(settings.problems()):
+            column = layout.box().column(align=True)
+            _label(column, context, problem.text, icon="ERROR")
+            column.operator("object.radiosity_fix", text=FIXES[problem.kind][0]).number = number
+        if settings.plan and not settings.problems():
+            layout.label(text="Nothing stands in the way", icon="CHECKMARK")
         if "seconds" in plan:
             column = layout.column(align=True)
             _figure(column, "Time", f"About {plan['seconds']:.1f} s")
             _figure(column, "Memory", f"About {plan['memory_mb']:,.0f} MB")
+        if plan.get("costs"):
+            row = layout.row(align=True)
+            for error, seconds in plan["costs"]:
+                text = f"{100 * error:g} %: {seconds:.0f} s"
+                row.operator("object.radiosity_accuracy", text=text).percent = 100 * error
         for effect in plan.get("effects", ()):
             column = layout.column(align=True)
             column.active = effect["active"]

@@ -9,6 +9,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 
 from ..core import settings as core
 from . import viewport
+from .checklist import Problem
 
 LAYER_ITEMS = [
     ("combined", "Combined", "Emitted plus reflected light: what the surface looks like"),
@@ -50,6 +51,20 @@ def _show_layer(settings: "RadiosityBakerSettings", _context: bpy.types.Context)
         viewport.show_layer(settings.id_data, report, settings.layer)
 
 
+def _plan_again(settings: "RadiosityBakerSettings", _context: bpy.types.Context) -> None:
+    """A plan that is on show follows the settings, once they have come to rest."""
+    if not settings.plan:
+        return
+    if bpy.app.timers.is_registered(_replan):
+        bpy.app.timers.unregister(_replan)
+    bpy.app.timers.register(_replan, first_interval=0.3)
+
+
+def _replan() -> None:
+    if bpy.ops.object.radiosity_plan.poll():
+        bpy.ops.object.radiosity_plan("EXEC_DEFAULT", False)
+
+
 class RadiosityBakerSettings(bpy.types.PropertyGroup):
     """`scene.radiosity_baker`: the settings of the next bake and the report of the last."""
 
@@ -58,6 +73,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         description="What ends the bake: an accuracy that is reached, or a time that is up",
         items=GOAL_ITEMS,
         default="ERROR",
+        update=_plan_again,
     )
     error: FloatProperty(
         name="Error",
@@ -69,6 +85,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         max=100.0,
         soft_max=20.0,
         precision=1,
+        update=_plan_again,
     )
     seconds: FloatProperty(
         name="Time",
@@ -81,18 +98,21 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         soft_max=600.0,
         step=100,
         precision=1,
+        update=_plan_again,
     )
     result: EnumProperty(
         name="Result",
         description="Where the baked light goes",
         items=RESULT_ITEMS,
         default="NEW",
+        update=_plan_again,
     )
     density: EnumProperty(
         name="Tessellation",
         description="How finely the objects are split, so that their vertices can hold shadows",
         items=DENSITY_ITEMS,
         default="TRIANGLES",
+        update=_plan_again,
     )
     triangles: IntProperty(
         name="Count",
@@ -102,6 +122,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         soft_max=500_000,
         max=20_000_000,
         step=1000,
+        update=_plan_again,
     )
     size: FloatProperty(
         name="Length",
@@ -112,12 +133,14 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         min=0.0001,
         soft_min=0.005,
         soft_max=10.0,
+        update=_plan_again,
     )
     estimator: EnumProperty(
         name="Form Factors",
         description="How the exchange of light between the patches is computed",
         items=ESTIMATOR_ITEMS,
         default="auto",
+        update=_plan_again,
     )
     seed: IntProperty(
         name="Seed",
@@ -221,6 +244,11 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         """The report of the last bake, or None before the first."""
         return _parsed(self.report) if self.report else None
 
+    def problems(self) -> list[Problem]:
+        """What the last check found."""
+        found = _parsed(self.plan).get("problems", []) if self.plan else []
+        return [Problem(entry["kind"], entry["text"], tuple(entry["objects"])) for entry in found]
+
     def last_plan(self) -> dict[str, Any]:
         """The plan made since the last bake, or else what that bake simulated; empty before either."""
         if self.plan:
@@ -241,5 +269,7 @@ def register() -> None:
 
 
 def unregister() -> None:
+    if bpy.app.timers.is_registered(_replan):
+        bpy.app.timers.unregister(_replan)
     del bpy.types.Scene.radiosity_baker
     bpy.utils.unregister_class(RadiosityBakerSettings)

@@ -392,11 +392,15 @@ def _check_receivers(receivers: Sequence[bpy.types.Object], sources: list[Receiv
             raise SceneError(f"Object '{obj.name}' has no faces that render: give it some, or leave it out.")
 
 
+class NoLightError(SceneError):
+    """Nothing in the scene gives off light."""
+
+
 def _check_light(scene: Scene, name: str) -> None:
     used = {int(index) for obj in scene.objects for index in np.unique(obj.surface)}
     shines = isinstance(scene.sky, SkyMap) or any(scene.sky)
     if not scene.lamps and not shines and not any(any(scene.surfaces[index].emission) for index in used):
-        raise SceneError(
+        raise NoLightError(
             f"Scene '{name}' has no light, so all would be black: add a lamp, give a material emission, or give the "
             "world a colour."
         )

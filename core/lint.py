@@ -46,7 +46,7 @@ def findings(scene: Scene, *, kept: bool = False) -> list[Finding]:
         found += [Finding(kind, receiver.name, count) for kind, count in counts.items() if count]
     used = [np.bincount(o.surface, minlength=len(scene.surfaces)) for o in scene.objects]
     for surface, count in zip(scene.surfaces, np.sum(used, axis=0), strict=True):
-        if count and max(surface.albedo) > ALBEDO_LIMIT:
+        if count and max(surface.albedo) >= ALBEDO_LIMIT:  # Readers have clipped it there.
             found.append(Finding("albedo", surface.name, int(count)))
     return found
 
