@@ -9,8 +9,9 @@ from typing import ClassVar
 
 import bpy
 
-from . import viewport
+from . import presets, viewport
 from .checklist import FIXES
+from .copies import original_of
 from .job import BakeJob
 from .wording import count, energy_line, error_causes, percent, stage, time_line
 
@@ -50,6 +51,39 @@ class BakeSection:
         column.active = settings.result != "KEEP"
         column.prop(settings, "density")
         column.prop(settings, "triangles" if settings.density == "TRIANGLES" else "size")
+
+    def draw_header_preset(self, _context: bpy.types.Context) -> None:
+        menu = (
+            presets.VIEW3D_PT_radiosity_presets
+            if self.bl_space_type == "VIEW_3D"
+            else presets.RENDER_PT_radiosity_presets
+        )
+        menu.draw_panel_header(self.layout)
+
+
+class ObjectSection:
+    bl_label = "Active Object"
+    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return context.object is not None and context.object.type == "MESH"
+
+    def draw(self, context: bpy.types.Context) -> None:
+        obj, layout = original_of(context.view_layer, context.object), self.layout
+        own = obj.radiosity_baker
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        layout.label(text=obj.name, icon="OBJECT_DATA")
+        column = layout.column(heading="Light")
+        column.prop(own, "receives")
+        column.prop(own, "casts")
+        column.prop(own, "bounces")
+        row = layout.row(heading="Longest Edge")
+        row.prop(own, "use_size", text="")
+        size = row.row()
+        size.active = own.use_size
+        size.prop(own, "size", text="")
 
 
 class LastBakeSection:
@@ -207,7 +241,7 @@ def _panels() -> list[type]:
     made = []
     for place, where in PLACES.items():
         main = f"{place}_PT_radiosity"
-        for section in (BakeSection, LastBakeSection, PlanSection, AdvancedSection):
+        for section in (BakeSection, ObjectSection, LastBakeSection, PlanSection, AdvancedSection):
             name = main if section is BakeSection else f"{main}_{section.__name__.removesuffix('Section').lower()}"
             about = dict(where, bl_idname=name)
             if section is not BakeSection:

@@ -263,13 +263,52 @@ def _parsed(report: str) -> dict[str, Any]:
     return json.loads(report)
 
 
+class RadiosityBakerObjectSettings(bpy.types.PropertyGroup):
+    """`object.radiosity_baker`: what is different for one object."""
+
+    receives: BoolProperty(
+        name="Receives",
+        description="Bake light onto this object, when it is among those to bake",
+        default=True,
+    )
+    casts: BoolProperty(
+        name="Casts",
+        description="Let this object stand in the way of light, and cast shadows",
+        default=True,
+    )
+    bounces: BoolProperty(
+        name="Bounces",
+        description="Let this object reflect light onto others, and give off its own",
+        default=True,
+    )
+    use_size: BoolProperty(
+        name="Own Tessellation",
+        description="Split this object to a size of its own",
+        default=False,
+    )
+    size: FloatProperty(
+        name="Longest Edge",
+        description="The longest edge a triangle of this object may have after the split",
+        subtype="DISTANCE",
+        unit="LENGTH",
+        default=0.1,
+        min=0.0001,
+        soft_min=0.005,
+        soft_max=10.0,
+    )
+
+
 def register() -> None:
     bpy.utils.register_class(RadiosityBakerSettings)
+    bpy.utils.register_class(RadiosityBakerObjectSettings)
     bpy.types.Scene.radiosity_baker = PointerProperty(type=RadiosityBakerSettings)
+    bpy.types.Object.radiosity_baker = PointerProperty(type=RadiosityBakerObjectSettings)
 
 
 def unregister() -> None:
     if bpy.app.timers.is_registered(_replan):
         bpy.app.timers.unregister(_replan)
+    del bpy.types.Object.radiosity_baker
     del bpy.types.Scene.radiosity_baker
+    bpy.utils.unregister_class(RadiosityBakerObjectSettings)
     bpy.utils.unregister_class(RadiosityBakerSettings)
