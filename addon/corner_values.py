@@ -30,7 +30,7 @@ def corner_colors(mesh: bpy.types.Mesh, corners: Int32, surface: Int32, surfaces
     """
 
     def read(own: MaterialSurface) -> Callable[[Int32], Float32] | None:
-        return None if own.color_attribute is None else lambda some: _colors(mesh, some, own.color_attribute)
+        return None if own.color_attribute is None else lambda some: colors_of(mesh, some, own.color_attribute)
 
     return _filled(np.ones((*corners.shape, 3), np.float32), corners, surface, surfaces, read)
 
@@ -53,20 +53,27 @@ def _filled(
     return values if found else None
 
 
-def _placed(mesh: bpy.types.Mesh, corners: Int32, placement: Placement) -> Float32:
-    layer = mesh.uv_layers.get(placement.uv_map) if placement.uv_map else _rendered(mesh.uv_layers)
+def uv_of(mesh: bpy.types.Mesh, corners: Int32, name: str) -> Float32:
+    """(t, 3, 2) coordinates of corners (t, 3) on the UV map of a name; empty: on the active one for rendering."""
+    layer = mesh.uv_layers.get(name) if name else _rendered(mesh.uv_layers)
     uv = np.zeros((len(mesh.loops), 2), np.float32)
     if layer is not None:
         layer.uv.foreach_get("vector", uv.ravel())
+    return uv[corners]
+
+
+def _placed(mesh: bpy.types.Mesh, corners: Int32, placement: Placement) -> Float32:
     matrix = np.array(placement.matrix, np.float32)
-    return np.asarray(uv[corners] @ matrix[:, :2].T + matrix[:, 2], np.float32)
+    moved = uv_of(mesh, corners, placement.uv_map) @ matrix[:, :2].T + matrix[:, 2]
+    return np.asarray(moved, np.float32)
 
 
 def _rendered(layers: bpy.types.bpy_prop_collection) -> bpy.types.MeshUVLoopLayer | None:
     return next((layer for layer in layers if layer.active_render), None)
 
 
-def _colors(mesh: bpy.types.Mesh, corners: Int32, name: str) -> Float32:
+def colors_of(mesh: bpy.types.Mesh, corners: Int32, name: str) -> Float32:
+    """(t, 3, 3) colours of corners (t, 3) in the attribute of a name; empty: in the active one for rendering."""
     attributes = mesh.color_attributes
     index = attributes.find(name) if name else attributes.render_color_index
     if index < 0:

@@ -14,6 +14,8 @@ import numpy as np
 
 from ..core.comparison import SurfacePoints
 from ..core.scene import Float64, Scene
+from ..core.tessellation import Int64
+from .corner_values import colors_of, uv_of
 
 #: Height of a probe over the surface and size of a probe, relative to the extent of all receivers.
 _HEIGHT, _SIZE = 1e-5, 2e-5
@@ -93,6 +95,7 @@ def _probes(context: bpy.types.Context, scene: Scene, points: SurfacePoints) -> 
         mesh.polygons.foreach_set("use_smooth", np.ones(len(points), bool))
         mesh.normals_split_custom_set(np.repeat(points.shading, 3, axis=0).tolist())
     mesh.update()
+    _copy_values(context, points, mesh)
     obj = bpy.data.objects.new("Probes", mesh)
     # Rays in fog still see it: what no ray at all can see, Cycles leaves out and does not bake.
     obj.visible_camera = obj.visible_diffuse = obj.visible_glossy = obj.visible_transmission = False
@@ -105,6 +108,39 @@ def _probes(context: bpy.types.Context, scene: Scene, points: SurfacePoints) -> 
         bpy.data.objects.remove(obj)
         bpy.data.meshes.remove(mesh)
         context.view_layer.update()
+
+
+def _copy_values(context: bpy.types.Context, points: SurfacePoints, probes: bpy.types.Mesh) -> None:
+    """Give each probe the UV coordinates and the colours that the receivers have at its point."""
+    depsgraph = context.evaluated_depsgraph_get()
+    for number, name in enumerate(points.names):
+        own = np.flatnonzero(points.receiver == number)
+        obj = context.view_layer.objects[name].evaluated_get(depsgraph)
+        turn = [0, 2, 1] if obj.matrix_world.is_negative else [0, 1, 2]
+        obj.data.calc_loop_triangles()
+        corners = np.empty((len(obj.data.loop_triangles), 3), np.int32)
+        obj.data.loop_triangles.foreach_get("loops", corners.ravel())
+        corners = corners[points.triangle[own]][:, turn]
+        for layer in obj.data.uv_layers:
+            target = probes.uv_layers.get(layer.name) or probes.uv_layers.new(name=layer.name, do_init=False)
+            values = np.einsum("pk,pkc->pc", points.barycentric[own], uv_of(obj.data, corners, layer.name))
+            _put(target.uv, "vector", own, values)
+            target.active_render = target.active_render or layer.active_render
+        for index, attribute in enumerate(obj.data.color_attributes):
+            target = probes.color_attributes.get(attribute.name)
+            target = target or probes.color_attributes.new(attribute.name, "FLOAT_COLOR", "CORNER")
+            values = np.einsum("pk,pkc->pc", points.barycentric[own], colors_of(obj.data, corners, attribute.name))
+            _put(target.data, "color", own, np.column_stack([values, np.ones(len(own))]))
+            if index == obj.data.color_attributes.render_color_index:
+                probes.color_attributes.render_color_index = probes.color_attributes.find(attribute.name)
+
+
+def _put(corners: bpy.types.bpy_prop_collection, name: str, probes: Int64, values: Float64) -> None:
+    """Give all three corners of some probes (n,) their values (n, k)."""
+    every = np.empty((len(corners) // 3, 3, values.shape[1]), np.float32)
+    corners.foreach_get(name, every.ravel())
+    every[probes] = values[:, None]
+    corners.foreach_set(name, every.ravel())
 
 
 def _probe_vertices(scene: Scene, points: SurfacePoints) -> Float64:
