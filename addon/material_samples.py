@@ -191,8 +191,7 @@ def _finely_cut(studio: bpy.types.Scene, request: _Request, lattice: Lattice) ->
     mesh = at_once(build_mesh(request.mesh, source, parts))
     obj = bpy.data.objects.new(_ATTRIBUTE, mesh)
     try:
-        mesh.materials.clear()
-        for _ in request.materials:
+        if not mesh.materials:
             mesh.materials.append(None)
         mesh.use_auto_texspace = False
         mesh.texspace_location, mesh.texspace_size = request.texture_space

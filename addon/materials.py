@@ -19,7 +19,7 @@ from mathutils import Matrix
 
 from ..core.scene import ALBEDO_LIMIT, RGB, Float64, Surface, Texture
 from .compat import shader_tree
-from .images import MISSING, UnreadableImage, has_pixels, read_image
+from .images import MISSING, Extension, UnreadableImage, has_pixels, read_image
 
 #: What Cycles gives faces without a material: its default Principled BSDF, of which `_principled` makes this.
 DEFAULT_SURFACE = Surface("", albedo=(0.8, 0.8, 0.8))
@@ -34,7 +34,7 @@ class Placement:
 
     uv_map: str
     matrix: tuple[tuple[float, float, float], ...]
-    extension: Literal["repeat", "extend", "clip", "mirror"]
+    extension: Extension
     interpolation: Literal["linear", "closest"]
 
 
@@ -64,7 +64,7 @@ def read_material(
         return MaterialSurface(material.name, albedo=_rgb(np.array(material.diffuse_color[:3]))), []
     reader = _TreeReader(f"Material '{material.name}'", object_color)
     shading = reader.output(tree)
-    if shading.albedo.max() > ALBEDO_LIMIT:
+    if shading.albedo.max() > ALBEDO_LIMIT and not reader.unread:
         reader.warn(f"reflects more than it receives; its colour is limited to {ALBEDO_LIMIT}. Lower the base colour.")
     albedo, albedo_texture = reader.split(np.clip(shading.albedo, 0.0, ALBEDO_LIMIT))
     emission, emission_texture = reader.split(np.maximum(shading.emission, 0.0))
@@ -372,7 +372,7 @@ def _object_info(reader: _TreeReader, _: bpy.types.Node, output: bpy.types.NodeS
 
 
 def _image(reader: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
-    """Pixels as Cycles shows them: colours with an alpha that is not used are premultiplied."""
+    """Pixels as Cycles shows them."""
     if reader.object_color is None:
         raise Unreadable
     if node.projection != "FLAT":
@@ -384,26 +384,18 @@ def _image(reader: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSock
         )
         reader.warn(f"shows pink, as in a render, because {missing}: find the file, or choose another image.")
         return np.array(MISSING[:3]) if output.name == "Color" else np.ones(1)
+    placement = _placement(node)
+    smooth, premultiplied = placement.interpolation == "linear", not node.outputs["Alpha"].is_linked
     try:
-        pixels = read_image(image)
+        colour, alpha = read_image(image, placement.extension, smooth=smooth, premultiplied=premultiplied)
     except UnreadableImage as problem:
         raise Unreadable(f"has an image, '{image.name}', {problem}") from problem
-    reader.place(_placement(node))
-    alpha = pixels[..., 3:]
-    if output.name == "Alpha":
-        return np.ones(1) if image.alpha_mode == "NONE" else alpha.astype(np.float64)
-    colour = pixels[..., :3].astype(np.float64)
-    data = image.colorspace_settings.is_data or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}
-    straight = not image.is_float
-    if data or alpha.min() >= 1.0:
-        return colour
-    if node.outputs["Alpha"].is_linked:
-        return colour if straight else np.divide(colour, alpha, out=colour, where=alpha > 0.0)
-    return colour * alpha if straight else colour
+    reader.place(placement)
+    return np.asarray(alpha if output.name == "Alpha" else colour, np.float64)
 
 
 def _placement(node: bpy.types.Node) -> Placement:
-    extensions = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
+    extensions: dict[str, Extension] = {"REPEAT": "repeat", "EXTEND": "extend", "CLIP": "clip", "MIRROR": "mirror"}
     uv_map, matrix = _coordinates(node.inputs["Vector"])
     rows = tuple((row[0], row[1], row[3]) for row in matrix[:2])
     closest = node.interpolation == "Closest"
