@@ -26,7 +26,7 @@ from .slices import at_once
 from .tessellated_mesh import MeshData, build_mesh
 
 #: Parts that all sampled meshes together are cut into, and each at least; most parts along an edge.
-_PARTS, _FEWEST, _FINEST = 200_000, 2_000, 96
+_PARTS, _FEWEST, _FINEST = 60_000, 1_000, 96
 #: How far the corners of the parts move to their middles. Where six meet, six places around count instead of one.
 _INWARD = 0.25
 #: Pixels across the texture.

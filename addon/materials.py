@@ -64,7 +64,8 @@ def read_material(
         return MaterialSurface(material.name, albedo=_rgb(np.array(material.diffuse_color[:3]))), []
     reader = _TreeReader(f"Material '{material.name}'", object_color)
     shading = reader.output(tree)
-    if shading.albedo.max() > ALBEDO_LIMIT and not reader.unread:
+    even = shading.albedo.ndim == 1 and shading.color_attribute is None and not reader.unread
+    if even and shading.albedo.max() > ALBEDO_LIMIT:
         reader.warn(f"reflects more than it receives; its colour is limited to {ALBEDO_LIMIT}. Lower the base colour.")
     albedo, albedo_texture = reader.split(np.clip(shading.albedo, 0.0, ALBEDO_LIMIT))
     emission, emission_texture = reader.split(np.maximum(shading.emission, 0.0))

@@ -83,7 +83,7 @@ def softbox() -> None:
 
 @effect_scene("albedo textures")
 def image_texture() -> None:
-    stage(pictured("Picture", image("Spots", 6, 6, seed=1)), pictured("Label", image("Stripes", 1, 4, seed=2), 0.5))
+    stage(pictured("Picture", image("Spots", 4, 4, seed=1)), pictured("Label", image("Stripes", 1, 4, seed=2), 0.5))
     softbox()
 
 
