@@ -125,13 +125,18 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
-        gather_rays=32,
+        gather_rays=gather_rays(asked),
         passes=2,
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),
         threshold=1e-5,
         emitters_by_rays=emitting_triangles(scene) > MOST_PANELS,
     )
+
+
+def gather_rays(error: float) -> int:
+    """Rays of a sample point: as many as bring its noise in proportion to the asked error. A power of two."""
+    return int(2 ** np.clip(np.rint(np.log2(32 * (0.02 / error) ** 2)), 3, 6))
 
 
 def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[dict[str, float], float]:

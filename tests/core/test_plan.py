@@ -10,7 +10,7 @@ import pytest
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, plan
+from radiosity_baker.core.plan import LOOKING, gather_rays, plan
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
@@ -164,3 +164,9 @@ def test_planning_changes_nothing(build):
     assert first.effort == second.effort
     assert [o.vertices.tobytes() for o in room.objects] == before
     assert np.isfinite(first.seconds)
+
+
+@pytest.mark.parametrize(("error", "rays"), [(0.1, 8), (0.04, 8), (0.02, 32), (0.014, 64), (0.001, 64)])
+def test_noise_falls_with_the_root_of_the_rays(error, rays):
+    """Half the error takes four times the rays; the fewest tell a solid's inside, more of them are passes."""
+    assert gather_rays(error) == rays
