@@ -28,7 +28,7 @@ from ..core.progress import Cancelled, Progress
 from ..core.result import Report
 from ..core.scene import SceneError
 from ..core.settings import LAYERS, Settings
-from . import accuracy_plot, accuracy_report, wording
+from . import accuracy_plot, accuracy_report, properties, wording
 from .accuracy import Asked, measure
 from .bake_scene import bake_objects
 from .preview import render_preview
@@ -56,6 +56,8 @@ def run(arguments: Sequence[str]) -> int:
         options = _parser().parse_args(arguments)
     except SystemExit as stop:  # argparse has said what it has to say; Blender must not quit half-way for it
         return int(stop.code or SUCCESS)
+    if not hasattr(bpy.types.Object, "radiosity_baker"):
+        properties.register()  # What the file says of its objects is unreadable without.
     progress = Progress() if options.quiet else PrintedProgress()
     try:
         with _interruptible(progress):

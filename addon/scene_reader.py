@@ -40,6 +40,10 @@ def pick_receivers(
             "on in the Outliner."
         )
     picked = list(dict.fromkeys(original_of(view_layer, obj) for obj in picked))
+    if names is None:
+        picked = [obj for obj in picked if not hasattr(obj, "radiosity_baker") or obj.radiosity_baker.receives]
+        if not picked:
+            raise SceneError("No object receives light: switch Receives on for one (Radiosity panel, Active Object).")
     for obj in picked:
         _check_rendered(obj, rendered)
     return picked
@@ -173,6 +177,10 @@ class _Reading:
                 number = self.samples.add(obj, data, name, matrix, _materials(obj))
             self._sampled.append((len(self.objects), number, turn))
         uv, colors = self._corner_values(obj, mesh, surface)
+        own = getattr(obj.original, "radiosity_baker", None)  # of the person, if the add-on is enabled
+        casts, bounces = own is None or own.casts, own is None or own.bounces
+        if not (receives or casts):
+            return
         self.objects.append(
             SceneObject(
                 name,
@@ -183,8 +191,15 @@ class _Reading:
                 receives=receives,
                 uv=uv if uv is None else uv[:, turn],
                 colors=colors if colors is None else colors[:, turn],
+                present=casts and bounces,
+                size=own.size if own is not None and own.use_size else None,
             )
         )
+        if casts and not bounces:
+            # What the rest of the scene meets in its place: the same shape, and black.
+            black = np.full(len(mesh.triangles), self.surfaces.black(), np.int32)
+            shape = self.objects[-1]
+            self.objects.append(SceneObject(f"{name} (black)", shape.vertices, shape.triangles, black, receives=False))
         if receives:
             self.sources.append(
                 ReceiverSource(
@@ -311,6 +326,14 @@ class _SurfaceTable:
         """Take back the warnings of what Cycles has read after all."""
         unread = {warning for s in self.all if isinstance(s, MaterialSurface) for warning in s.unread}
         self.warnings = [warning for warning in self.warnings if warning not in unread]
+
+    def black(self) -> int:
+        """The surface of what blocks light and does nothing else with it."""
+        key = ("", "black")
+        if key not in self._index:
+            self._index[key] = len(self.all)
+            self.all.append(Surface("black", albedo=(0.0, 0.0, 0.0)))
+        return self._index[key]
 
     def _of(self, material: bpy.types.Material | None, obj: bpy.types.Object) -> int:
         name = None if material is None else material.name_full

@@ -53,17 +53,17 @@ def bake(
 
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
-            space = unit_space(scene)
+            space, around = unit_space(scene), scene.surroundings()
             receivers = make_receivers(scene, space, settings, effort.triangles)
-            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(scene, space)
+            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
             if clock.progress.watched:
                 # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
-                coarse = make_patches(scene, space, split_objects(scene, 1))
+                coarse = make_patches(around, space, split_objects(around, 1))
                 straight = DirectLight(lights, Visibility(coarse.corners), settings.seed)
                 first = Survey(receivers, straight, None, effort, settings.seed, workers)
                 first.run_pass()
                 show(coarse, (), first, average_light(first))
-            patches, visibility = patches_by_light(scene, space, lights, effort, settings.seed, workers)
+            patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)

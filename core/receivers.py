@@ -67,8 +67,9 @@ def make_receivers(scene: Scene, space: Space, settings: Settings, triangles: in
     Where the mesh is to be kept, the output has the input's triangles, and only the sampling is as fine as that.
     """
     objects = scene.receivers()
-    edge = settings.size or edge_for_count([o.vertices for o in objects], [o.triangles for o in objects], triangles)
-    fine = [triform(whole(o.vertices, o.triangles), edge) for o in objects]
+    shared = [o for o in objects if o.size is None] or objects
+    edge = settings.size or edge_for_count([o.vertices for o in shared], [o.triangles for o in shared], triangles)
+    fine = [triform(whole(o.vertices, o.triangles), o.size or edge) for o in objects]
     return lay_out(objects, fine, space, tessellate=settings.tessellate)
 
 

@@ -6,7 +6,7 @@ reader of the add-on fills these classes in, and a test or another program can d
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
 
@@ -87,7 +87,9 @@ class SceneObject:
     surface (t,) int32 into Scene.surfaces. corner_normals (t, 3, 3) float32 are the shading normals of each triangle's
     corners; None shades flat. A receiver is what gets a baked attribute; all objects block and bounce light.
     uv (t, 3, 2) float32: place of each triangle's corners in the textures of its own surface; needed where that has
-    any. colors (t, 3, 3) float32: corner colours that multiply the albedo.
+    any. colors (t, 3, 3) float32: corner colours that multiply the albedo. present: it blocks and bounces light; a
+    receiver that is not lies in the light and leaves no trace there. size: longest edge that its triangles may have
+    after the split, metres, where it is to have one of its own.
     """
 
     name: str
@@ -98,6 +100,8 @@ class SceneObject:
     receives: bool = True
     uv: Float32 | None = None
     colors: Float32 | None = None
+    present: bool = True
+    size: float | None = None
 
 
 @dataclass(frozen=True)
@@ -199,6 +203,14 @@ class Scene:
     lamps: tuple[Lamp, ...] = ()
     sky: RGB | SkyMap = (0.0, 0.0, 0.0)
     warnings: tuple[str, ...] = field(default=())
+
+    def surroundings(self) -> Scene:
+        """The scene as light meets it: without the objects that only receive. Raises SceneError when that is all."""
+        if all(o.present for o in self.objects):
+            return self
+        if not any(o.present for o in self.objects):
+            raise SceneError("No object casts shadows or bounces light: switch Casts on for at least one of them.")
+        return replace(self, objects=tuple(o for o in self.objects if o.present))
 
     def receivers(self) -> tuple[SceneObject, ...]:
         return tuple(o for o in self.objects if o.receives)
