@@ -118,7 +118,7 @@ class Adaptation:
             hidden = np.zeros(len(chosen), dtype=bool)
             if self._around is not None and len(near_contact):
                 some = Points(cells, chosen[near_contact], k, shift)
-                arriving, _, enclosed = gather_indirect(
+                arriving, _, enclosed, _ = gather_indirect(
                     some, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
                 )
                 grey = arriving[:, :-1] @ self._around.to_grey

@@ -59,7 +59,7 @@ def bake(
             if clock.progress.watched:
                 # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
                 coarse = make_patches(around, space, split_objects(around, 1))
-                straight = DirectLight(lights, Visibility(coarse.corners), settings.seed)
+                straight = DirectLight(lights, Visibility(coarse.corners, coarse.optics), settings.seed)
                 first = Survey(receivers, straight, None, effort, settings.seed, workers)
                 first.run_pass()
                 show(coarse, (), first, average_light(first))

@@ -60,17 +60,30 @@ def _check_object(scene_object: SceneObject, surfaces: int) -> None:
 
 
 def _check_surface(surface: Surface, warnings: list[str]) -> Surface:
-    values = np.array([*surface.albedo, *surface.emission])
+    shares = np.array([surface.albedo, surface.transmission, surface.mirror, surface.glass])
+    values = np.concatenate([shares.ravel(), surface.emission, surface.transparent, [surface.opacity]])
     if not np.isfinite(values).all() or values.min() < 0:
         raise SceneError(f"Material '{surface.name}' has a colour that is negative or not a number: pick another.")
     for texture in (surface.albedo_texture, surface.emission_texture):
         if texture is not None and not (np.isfinite(texture.pixels).all() and texture.pixels.min() >= 0):
             raise SceneError(f"Material '{surface.name}' has an image with values that are negative or not numbers.")
-    if max(surface.albedo) <= ALBEDO_LIMIT:
+    total = shares.sum(axis=0)
+    if total.max() <= ALBEDO_LIMIT and values[-4:].max() <= 1.0:
         return surface
-    warnings.append(
-        f"Material '{surface.name}' reflects all light or more; {ALBEDO_LIMIT:.2%} is used. Nothing real is whiter "
-        "than fresh snow at 90 %: pick a darker colour."
+    if total.max() > ALBEDO_LIMIT and not shares[2:].any():
+        warnings.append(
+            f"Material '{surface.name}' reflects all light or more; {ALBEDO_LIMIT:.2%} is used. Nothing real is whiter "
+            "than fresh snow at 90 %: pick a darker colour."
+        )
+    limited = shares * (ALBEDO_LIMIT / np.maximum(total, ALBEDO_LIMIT))
+    albedo, transmission, mirror, glass = ((float(r), float(g), float(b)) for r, g, b in limited)
+    red, green, blue = (min(channel, 1.0) for channel in surface.transparent)
+    return replace(
+        surface,
+        albedo=albedo,
+        transmission=transmission,
+        mirror=mirror,
+        glass=glass,
+        opacity=min(surface.opacity, 1.0),
+        transparent=(red, green, blue),
     )
-    red, green, blue = (min(channel, ALBEDO_LIMIT) for channel in surface.albedo)
-    return replace(surface, albedo=(red, green, blue))

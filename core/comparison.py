@@ -141,7 +141,7 @@ def locate(baked: BakedObject, triangle: Int32, barycentric: Float64) -> tuple[I
 def visible(scene: Scene, points: SurfacePoints, reference: Float64) -> Bool:
     """Points (p,) that somebody may see. No light at all on a surface that reflects means the inside of a solid, or the
     far side of everything."""
-    albedo = np.array([max(s.albedo) for s in scene.surfaces])
+    albedo = np.array([max(s.scattered) for s in scene.surfaces])
     reflects = np.zeros(len(points), dtype=bool)
     for number, receiver in enumerate(scene.receivers()):
         own = points.receiver == number

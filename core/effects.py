@@ -17,7 +17,7 @@ import numpy as np
 from .convexity import nothing_stands_between
 from .patches import triangle_geometry
 from .result import Effect
-from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp
+from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp, Surface
 from .settings import Settings
 from .textures import triangle_colours, varying_albedo, varying_emission
 
@@ -104,7 +104,7 @@ def sky(scene: Scene, _: Settings) -> Effect:
 
 def bounces(scene: Scene, settings: Settings) -> Effect:
     used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
-    albedo = max((max(scene.surfaces[i].albedo) for i in used), default=0.0)
+    albedo = max((max(scene.surfaces[i].scattered) for i in used), default=0.0)
     if albedo <= 0:
         return Effect("bounces", False, "every surface is black")
     if settings.estimator == "centroid":
@@ -113,6 +113,40 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
     matter = max(1, ceil(log(0.002) / log(mean))) if 0 < mean < 1 else 1
     rest = f"the next adds at most {mean ** (matter + 1):.2%} in a closed room"
     return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter, {rest}")
+
+
+def transparency(scene: Scene, _: Settings) -> Effect:
+    sheer = _used(scene, lambda surface: surface.opacity < 1.0)
+    shadowless = [o.name for o in scene.objects if not o.casts_shadow]
+    if sheer or shadowless:
+        reasons = [f"{_names(sheer)} let light through"] * bool(sheer)
+        reasons += [f"{_names(shadowless)} cast no shadow"] * bool(shadowless)
+        return Effect("transparency", True, "; ".join(reasons))
+    return Effect("transparency", False, "every surface is opaque")
+
+
+def diffuse_transmission(scene: Scene, _: Settings) -> Effect:
+    thin = _used(scene, lambda surface: max(surface.transmission) > 0.0)
+    reason = f"light that falls on one side of {_names(thin)} leaves on the other too"
+    return Effect("diffuse transmission", bool(thin), reason if thin else "no surface is translucent")
+
+
+def mirrors(scene: Scene, _: Settings) -> Effect:
+    shiny = _used(scene, lambda surface: max(surface.mirror) > 0.0)
+    return Effect("mirrors", bool(shiny), f"{_names(shiny)} reflect rays on" if shiny else "no surface mirrors")
+
+
+def clear_glass(scene: Scene, _: Settings) -> Effect:
+    glass = _used(scene, lambda surface: max(surface.glass) > 0.0)
+    reason = f"rays go straight through {_names(glass)}"
+    return Effect("clear glass", bool(glass), reason if glass else "no surface is clear glass")
+
+
+def goes_on(scene: Scene) -> bool:
+    """Whether rays go on from some surface, or through it."""
+    return bool(
+        _used(scene, lambda s: s.opacity < 1.0 or max(np.concatenate([s.transmission, s.mirror, s.glass])) > 0.0)
+    )
 
 
 def albedo_textures(scene: Scene, _: Settings) -> Effect:
@@ -137,6 +171,12 @@ def emitting_triangles(scene: Scene) -> int:
 def _lamps(name: str, kind: type, scene: Scene) -> Effect:
     names = [lamp.name for lamp in scene.lamps if isinstance(lamp, kind)]
     return Effect(name, bool(names), _names(names) if names else "none in the scene")
+
+
+def _used(scene: Scene, has: Callable[[Surface], bool]) -> list[str]:
+    """Names of the surfaces with a property that some triangle has."""
+    used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
+    return [surface.name for number, surface in enumerate(scene.surfaces) if number in used and has(surface)]
 
 
 def _names(names: list[str]) -> str:
@@ -203,10 +243,14 @@ def _with_even(name: Literal["albedo", "emission"]) -> Callable[[Scene], Scene]:
             values = getattr(triangle_colours(scene, scene_object), name)
             np.add.at(total, scene_object.surface, areas[:, None] * values)
             np.add.at(area, scene_object.surface, areas)
-        means: list[dict[str, Any]] = [
-            {name: tuple(mean), f"{name}_texture": None} for mean in (total / area[:, None]).tolist()
+        plain = np.array([s.scattered if name == "albedo" else s.emitted for s in scene.surfaces])
+        mean = np.divide(total / area[:, None], plain, out=np.zeros_like(plain), where=plain > 0.0)
+        scaled = ("albedo", "transmission") if name == "albedo" else ("emission",)
+        changes: list[dict[str, Any]] = [
+            {f"{name}_texture": None, **{field: tuple(factor * getattr(s, field)) for field in scaled}}
+            for s, factor in zip(scene.surfaces, mean, strict=True)
         ]
-        surfaces = tuple(replace(s, **mean) for s, mean in zip(scene.surfaces, means, strict=True))
+        surfaces = tuple(replace(s, **change) for s, change in zip(scene.surfaces, changes, strict=True))
         if name == "emission":
             return replace(scene, surfaces=surfaces)
         return replace(scene, surfaces=surfaces, objects=tuple(replace(o, colors=None) for o in scene.objects))
@@ -216,6 +260,21 @@ def _with_even(name: Literal["albedo", "emission"]) -> Callable[[Scene], Scene]:
 
 def _without_sky(scene: Scene) -> Scene:
     return replace(scene, sky=(0.0, 0.0, 0.0))
+
+
+def _opaque(scene: Scene) -> Scene:
+    return replace(
+        _with_surfaces(scene, opacity=1.0), objects=tuple(replace(o, casts_shadow=True) for o in scene.objects)
+    )
+
+
+def _with_surfaces(scene: Scene, **changes: Any) -> Scene:
+    return replace(scene, surfaces=tuple(replace(s, **changes) for s in scene.surfaces))
+
+
+def _without_share(name: str) -> Callable[[Scene], Scene]:
+    """What takes a share of the light away from all surfaces: it is swallowed instead."""
+    return lambda scene: _with_surfaces(scene, **{name: (0.0, 0.0, 0.0)})
 
 
 def _unchanged(scene: Scene) -> Scene:
@@ -232,6 +291,10 @@ EFFECTS: dict[str, Rule] = {
     "soft shadows": Rule(soft_shadows, _with_hard_shadows),
     "emitting surfaces": Rule(emitting_surfaces, _without_emission),
     "sky": Rule(sky, _without_sky),
+    "transparency": Rule(transparency, _opaque),
+    "diffuse transmission": Rule(diffuse_transmission, _without_share("transmission")),
+    "mirrors": Rule(mirrors, _without_share("mirror")),
+    "clear glass": Rule(clear_glass, _without_share("glass")),
     "bounces": Rule(bounces, _unchanged),
     "albedo textures": Rule(albedo_textures, _with_even("albedo")),
     "textured emission": Rule(textured_emission, _with_even("emission")),

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from copy import copy
+from dataclasses import replace
+
 import numpy as np
 
 from .direct.illumination import DirectLight, Illumination
@@ -31,42 +35,111 @@ class Points:
         if cells.shading is not None:
             blended = np.einsum("nc,nck->nk", self.weights, cells.shading[chosen])
             self.shading = blended / np.linalg.norm(blended, axis=1, keepdims=True)
+        self.front = None if cells.front is None else cells.front[cells.surface[chosen]]
+
+    def lit_from_behind(self) -> np.ndarray:
+        """Numbers of the points where light that arrives on the back counts too."""
+        return np.flatnonzero((self.front < 1).any(axis=1)) if self.front is not None else np.empty(0, dtype=np.int64)
+
+    def behind(self, chosen: np.ndarray) -> Points:
+        """The same places on the back of the surface."""
+        turned = copy(self)
+        turned.front = None
+        turned.weights, turned.barycentric = self.weights[chosen], self.barycentric[chosen]
+        turned.positions, turned.size = self.positions[chosen], self.size[chosen]
+        turned.normals, turned.shading = -self.normals[chosen], -self.shading[chosen]
+        return turned
+
+    def share(self, chosen: np.ndarray, columns: int) -> Float64:
+        """Share (n, columns) of the front in the light that counts: red, green and blue over and over, and grey."""
+        front = np.ones((len(chosen), 3)) if self.front is None else self.front[chosen]
+        share = np.tile(front, (1, columns // 3 + 1))[:, :columns]
+        if columns % 3:
+            share[:, -1] = front.mean(axis=1)
+        return share
 
 
 def gather_indirect(
     points: Points, hemispheres: Hemispheres, tables: Float32, seed: int, number: int, workers: Workers
-) -> tuple[Float64, Float64, Bool]:
-    """Irradiance (n, k) at the points from tables (codes, k) of radiosity, its deviation (n, k), and the points (n,)
-    from which nearly every ray meets the back of something: inside a solid, unless light gets there.
+) -> tuple[Float64, Float64, Bool, Counter[str]]:
+    """Irradiance (n, k) at the points from tables (codes, k) of radiosity, its deviation (n, k), the points (n,) from
+    which nearly every ray meets the back of something: inside a solid, unless light gets there; and the rays it took.
 
     The rays of a point are two independent sets; half their difference is how far the mean can be trusted.
     """
+    irradiance, deviation, enclosed, rays = _gather(points, hemispheres, tables, seed, f"gather {number}", workers)
+    lit = points.lit_from_behind()
+    if len(lit):
+        purpose = f"gather behind {number}"
+        other = _gather(points.behind(lit), hemispheres, tables, seed, purpose, workers)
+        share = points.share(lit, tables.shape[1])
+        irradiance[lit] = share * irradiance[lit] + (1.0 - share) * other[0]
+        deviation[lit] = share * deviation[lit] + (1.0 - share) * other[1]
+        enclosed[lit] &= other[2]
+        rays += other[3]
+    return irradiance, deviation, enclosed, rays
+
+
+def _gather(
+    points: Points, hemispheres: Hemispheres, tables: Float32, seed: int, purpose: str, workers: Workers
+) -> tuple[Float64, Float64, Bool, Counter[str]]:
     columns = [np.ascontiguousarray(tables[:, k]) for k in range(tables.shape[1])]
     codes = hemispheres.codes
 
-    def work(chunk: int, part: slice) -> tuple[Float64, Float64, Bool]:
-        rng = stream(seed, f"gather {number}", chunk)
-        code = hemispheres.cast(points.positions[part], points.normals[part], points.shading[part], rng)
+    def work(chunk: int, part: slice) -> tuple[Float64, Float64, Bool, Counter[str]]:
+        rng = stream(seed, purpose, chunk)
+        looks = hemispheres.cast(points.positions[part], points.normals[part], points.shading[part], rng)
+        code = looks.code
         flat, rays = code.ravel(), code.shape[1] // 2
-        halves = np.stack([np.add.reduce(column[flat].reshape(-1, rays), axis=1) for column in columns], axis=1)
+        if looks.mirrored is not None and len(tables) > hemispheres.code_count:
+            flat = flat + hemispheres.code_count * looks.mirrored.ravel()
+        tint = None if looks.tint is None else looks.tint.reshape(-1, 3)
+
+        def brought(k: int) -> Float32:
+            """Sums over the rays of each half of what column k says they bring."""
+            values = columns[k][flat]
+            if tint is not None:
+                # Columns come as red, green and blue, over and over, and perhaps one of grey at the end.
+                grey = k % 3 == 0 and k == len(columns) - 1
+                values *= tint.mean(axis=1) if grey else tint[:, k % 3]
+            return np.asarray(np.add.reduce(values.reshape(-1, rays), axis=1))
+
+        halves = np.stack([brought(k) for k in range(len(columns))], axis=1)
         halves = halves.reshape(len(code), 2, -1).astype(np.float64) / rays
         irradiance = (halves[:, 0] + halves[:, 1]) / 2.0
         deviation = (halves[:, 0] - halves[:, 1]) / 2.0
         behind = ((code >= codes.triangles) & (code < codes.lost)).mean(axis=1)
-        return irradiance, deviation, behind > _ENCLOSED
+        rays_cast = Counter({"gather": code.size, "onward": looks.onward, "cut off": looks.cut})
+        return irradiance, deviation, behind > _ENCLOSED, rays_cast
 
-    parts = zip(*workers.map(work, len(points.positions), hemispheres.chunk), strict=True)
+    *parts, cast = zip(*workers.map(work, len(points.positions), hemispheres.chunk), strict=True)
     irradiance, deviation, enclosed = (np.concatenate(p) for p in parts)
-    return irradiance, deviation, enclosed
+    return irradiance, deviation, enclosed, sum(cast, Counter())
 
 
 def gather_direct(
     points: Points, direct_light: DirectLight, shadow_rays: int, seed: int, number: int, workers: Workers
 ) -> Illumination:
     """Light at the points straight from lamps and emitting surfaces."""
+    light = _gather_direct(points, direct_light, shadow_rays, seed, f"direct {number}", workers)
+    lit = points.lit_from_behind()
+    if not len(lit):
+        return light
+    other = _gather_direct(points.behind(lit), direct_light, shadow_rays, seed, f"direct behind {number}", workers)
+    share = points.share(lit, 3)
+    irradiance, variance, signature = light.irradiance.copy(), light.variance.copy(), light.signature.copy()
+    irradiance[lit] = share * light.irradiance[lit] + (1.0 - share) * other.irradiance
+    variance[lit] = share**2 * light.variance[lit] + (1.0 - share) ** 2 * other.variance
+    partly = (signature[lit] < 0) | (other.signature < 0)
+    signature[lit] = np.where(partly, -1, signature[lit] + 3 * other.signature)
+    return replace(light, irradiance=irradiance, variance=variance, signature=signature, rays=light.rays + other.rays)
 
+
+def _gather_direct(
+    points: Points, direct_light: DirectLight, shadow_rays: int, seed: int, purpose: str, workers: Workers
+) -> Illumination:
     def work(chunk: int, part: slice) -> Illumination:
-        rng = stream(seed, f"direct {number}", chunk)
+        rng = stream(seed, purpose, chunk)
         return direct_light.at(points.positions[part], points.normals[part], points.shading[part], shadow_rays, rng)
 
     parts = list(workers.map(work, len(points.positions), _CHUNK))
@@ -74,7 +147,7 @@ def gather_direct(
         np.concatenate([p.irradiance for p in parts]),
         np.concatenate([p.variance for p in parts]),
         np.concatenate([p.signature for p in parts]),
-        sum(p.rays for p in parts),
+        sum((p.rays for p in parts), Counter()),
     )
 
 

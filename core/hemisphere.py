@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from copy import copy
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .patches import Patches
 from .sampling import cosine_patterns, frames
 from .scene import Bool, Float32, Float64
 from .sky import DARK, Sky
-from .visibility import Visibility, offset_along
+from .visibility import LOST, Visibility, offset_along
 
 #: Rays a chunk: few enough to stay in the processor's caches, enough that Python hardly counts.
 CHUNK_RAYS = 65536
@@ -29,13 +30,25 @@ class Codes:
 
     @property
     def lost(self) -> int:
-        """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles."""
+        """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles. One that
+        was absorbed on its way neither."""
         return 2 * self.triangles
 
     @property
     def escaped(self) -> int:
         """The first of the codes of rays that left the scene, one for each texel of the sky."""
         return 2 * self.triangles + 1
+
+
+class Looks(NamedTuple):
+    """What rays from n points met: code (n, rays) int32; tint (n, rays, 3) of what they bring, None where it is one;
+    mirrored (n, rays), None where none was; rays it took beside the first ones, and how many of them were cut off."""
+
+    code: np.ndarray
+    tint: Float32 | None
+    mirrored: Bool | None
+    onward: int
+    cut: int
 
 
 class Hemispheres:
@@ -60,6 +73,11 @@ class Hemispheres:
         other._choose(rays, rng)  # noqa: SLF001 - a copy of itself
         return other
 
+    @property
+    def code_count(self) -> int:
+        """How many codes there are. Tables over twice as many hold what rays off mirrors bring in the second half."""
+        return self.codes.escaped + len(self.sky.light)
+
     def _choose(self, rays: int, rng: np.random.Generator) -> None:
         self.rays = rays
         self.chunk = max(1, CHUNK_RAYS // rays)
@@ -68,24 +86,28 @@ class Hemispheres:
             [cosine_patterns(_PATTERNS, half, rng), cosine_patterns(_PATTERNS, rays - half, rng)], axis=1
         )
 
-    def cast(self, points: Float64, normals: Float64, shading: Float64, rng: np.random.Generator) -> np.ndarray:
-        """Codes (n, rays) int32 for points (n, 3) with geometric normals and shading normals (n, 3)."""
+    def cast(self, points: Float64, normals: Float64, shading: Float64, rng: np.random.Generator) -> Looks:
+        """Looks around from points (n, 3) with geometric normals and shading normals (n, 3)."""
         count = len(points)
         turn = rng.random(count, dtype=np.float32) * np.float32(2 * np.pi)
         pattern = self._patterns[rng.integers(_PATTERNS, size=count)]
         directions = (pattern @ frames(shading.astype(np.float32), turn)).reshape(-1, 3)
         origins = np.repeat(offset_along(points, normals), self.rays, axis=0)
-        hit = self._visibility.nearest(origins, directions)
-        code = hit.copy()
-        code[self._from_behind(hit, directions)] += self.codes.triangles
-        left = np.flatnonzero(hit < 0)
-        code[left] = self.codes.escaped + self.sky.texel(directions[left])
+        path = self._visibility.follow(origins, directions, rng)
+        code = path.hit.copy()
+        code[self._from_behind(path.hit, path.directions)] += self.codes.triangles
+        left = np.flatnonzero(path.hit < 0)
+        code[left] = self.codes.escaped + self.sky.texel(path.directions[left])
+        if path.onward:
+            code[path.hit == LOST] = self.codes.lost
         code = code.reshape(count, self.rays)
         tilted = np.flatnonzero(np.einsum("nk,nk->n", normals, shading) < 1.0 - 1e-6)
         if len(tilted):
             below = directions.reshape(count, self.rays, 3)[tilted] @ normals[tilted].astype(np.float32)[:, :, None]
             code[tilted] = np.where(below[..., 0] <= 0, self.codes.lost, code[tilted])
-        return code
+        tint = None if path.tint is None else path.tint.reshape(count, self.rays, 3)
+        mirrored = None if path.mirrored is None else path.mirrored.reshape(count, self.rays)
+        return Looks(code, tint, mirrored, path.onward, path.cut)
 
     def covered(self, points: Float64, normals: Float64, reach: Float64) -> Bool:
         """Whether something lies within reach (n,) straight above each point (n, 3)."""

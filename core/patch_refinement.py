@@ -38,7 +38,7 @@ def patches_by_light(
     """About effort.patches patches, and more where direct light varies; and what is visible among them."""
     split = split_objects(scene, effort.patches)
     patches = make_patches(scene, space, split)
-    visibility = Visibility(patches.corners)
+    visibility = Visibility(patches.corners, patches.optics)
     light = DirectLight(lights, visibility, seed)
     fresh, fair = np.arange(len(patches)), 0.0
     for level in range(_LEVELS if lights else 0):
@@ -52,7 +52,7 @@ def patches_by_light(
         split, changed = _refined(split, patches, uneven)
         patches = make_patches(scene, space, split)
         fresh = np.unique(patches.patch[changed[patches.triangle]])
-    return patches, Visibility(patches.corners)
+    return patches, Visibility(patches.corners, patches.optics)
 
 
 def _light_inside(

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .optics import Optics, make_optics, stopping_share
 from .scene import Float32, Float64, Int32, Scene, SceneObject
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
 from .textures import Colours, constant_colours, mean_colours, varies
@@ -35,7 +36,8 @@ class Cells:
 
     corners (c, 3, 3), normals (c, 3), area (c,) in the unit box; shading (c, 3, 3) normals at the corners or None when
     all is flat; element (c,) the output triangle; barycentric (c, 3, 3) the cell's corners in the output triangle, or
-    None when each is one; surface (c,) into Scene.surfaces.
+    None when each is one; surface (c,) into Scene.surfaces. front (surfaces, 3): Surface.front_share, None when all are
+    one.
     """
 
     corners: Float64
@@ -45,6 +47,7 @@ class Cells:
     element: Int32
     barycentric: Float64 | None
     surface: Int32
+    front: Float64 | None = None
 
     def __len__(self) -> int:
         return len(self.area)
@@ -57,7 +60,9 @@ class Patches:
     corners (t, 3, 3), normals (t, 3) and area (t,) in the unit box; triangle (t,): its number in the split meshes,
     which may hold degenerate ones besides; patch (t,): the patch of each triangle; members (t,): the triangles patch by
     patch, from first (p + 1,) on. patch_area (p,), surface (p,) into Scene.surfaces, albedo (p, 3), emission (p, 3)
-    radiance W/(m^2 sr).
+    radiance W/(m^2 sr). transmission (p, 3): share that leaves on the other side, None if nothing transmits. optics:
+    where rays go on, None if nowhere; then a patch's light is that of the share of it where rays stop: coverage (p,),
+    None if that is all of it.
     """
 
     space: Space
@@ -72,9 +77,17 @@ class Patches:
     surface: Int32
     albedo: Float32
     emission: Float32
+    transmission: Float32 | None = None
+    optics: Optics | None = None
+    coverage: Float64 | None = None
 
     def __len__(self) -> int:
         return len(self.patch_area)
+
+    @property
+    def coloured(self) -> bool:
+        """Whether rays may bring light that was tinted on its way, or lost by different shares of its channels."""
+        return self.transmission is not None or (self.optics is not None and self.optics.tinted)
 
     def as_cells(self) -> Cells:
         """The triangles, to sample light on as on a receiver."""
@@ -138,6 +151,13 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     colours = constant_colours(scene, patch_surface)
     if any(varies(scene, o) for o in scene.objects):
         colours = _mean_colours(scene, split, solid, patch, area[solid] / patch_area[patch])
+    coverage = np.array([s.opacity * stopping_share(s) for s in scene.surfaces])[patch_surface]
+    front = np.array([s.front_share for s in scene.surfaces])[patch_surface]
+    diffuse = colours.albedo / np.maximum(coverage, 1e-12)[:, None]
+    shadowless = np.concatenate(
+        [np.full(len(m.triangles), not o.casts_shadow) for o, m in zip(scene.objects, split.meshes, strict=True)]
+    )
+    optics = make_optics(scene, surface[solid].astype(np.int32), shadowless[solid], corners[solid], normals[solid])
     return Patches(
         space=space,
         corners=corners[solid],
@@ -149,8 +169,11 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
         first=np.concatenate([[0], np.cumsum(np.bincount(patch, minlength=count))]).astype(np.int32),
         patch_area=patch_area,
         surface=patch_surface,
-        albedo=colours.albedo.astype(np.float32),
-        emission=colours.emission.astype(np.float32),
+        albedo=(diffuse * front).astype(np.float32),
+        emission=(colours.emission / np.maximum(coverage, 1e-12)[:, None]).astype(np.float32),
+        transmission=(diffuse * (1.0 - front)).astype(np.float32) if (front < 1.0).any() else None,
+        optics=optics,
+        coverage=None if optics is None else coverage,
     )
 
 

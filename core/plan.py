@@ -9,7 +9,7 @@ import numpy as np
 
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
-from .effects import LAMPS, MOST_PANELS, choose_effects, emitting_triangles
+from .effects import LAMPS, MOST_PANELS, choose_effects, emitting_triangles, goes_on
 from .parallel import Workers, thread_count
 from .patches import Space, make_patches, split_objects, unit_space
 from .progress import Progress
@@ -115,7 +115,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = settings.error or (0.02 if settings.seconds is None else 0.01)
     finer = min(max(0.02 / asked, 0.25), 4.0)
-    estimator = "hemisphere" if settings.estimator == "auto" else settings.estimator
+    estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
     return Effort(
         error=asked,

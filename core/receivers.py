@@ -70,11 +70,22 @@ def make_receivers(scene: Scene, space: Space, settings: Settings, triangles: in
     shared = [o for o in objects if o.size is None] or objects
     edge = settings.size or edge_for_count([o.vertices for o in shared], [o.triangles for o in shared], triangles)
     fine = [triform(whole(o.vertices, o.triangles), o.size or edge) for o in objects]
-    return lay_out(objects, fine, space, tessellate=settings.tessellate)
+    front = np.array([surface.front_share for surface in scene.surfaces])
+    return lay_out(objects, fine, space, front if (front < 1).any() else None, tessellate=settings.tessellate)
 
 
-def lay_out(objects: tuple[SceneObject, ...], fine: list[Tessellation], space: Space, *, tessellate: bool) -> Receivers:
-    """Cells on the triangles of the fine meshes, which become the output as well if `tessellate`."""
+def lay_out(
+    objects: tuple[SceneObject, ...],
+    fine: list[Tessellation],
+    space: Space,
+    front: Float64 | None = None,
+    *,
+    tessellate: bool,
+) -> Receivers:
+    """Cells on the triangles of the fine meshes, which become the output as well if `tessellate`.
+
+    front (surfaces, 3): Surface.front_share, None when all are one.
+    """
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]
     first = np.concatenate([[0], np.cumsum([len(m.triangles) for m in meshes])]).astype(np.int32)
     corners, normals, area, shading, surface = _faces(objects, fine, space)
@@ -90,7 +101,7 @@ def lay_out(objects: tuple[SceneObject, ...], fine: list[Tessellation], space: S
         objects=objects,
         meshes=tuple(meshes),
         fine=tuple(fine),
-        cells=Cells(corners, normals, area, None if flat else shading, element, barycentric, surface),
+        cells=Cells(corners, normals, area, None if flat else shading, element, barycentric, surface, front),
         first=first,
         element_corners=element_corners,
         element_shading=element_shading,
@@ -130,7 +141,8 @@ def split_cells(receivers: Receivers, chosen: Bool) -> tuple[Receivers, Int64]:
         sources.append(source + begin)
         begin = end
     tessellate = receivers.meshes == receivers.fine
-    return lay_out(receivers.objects, fine, receivers.space, tessellate=tessellate), np.concatenate(sources)
+    split_receivers = lay_out(receivers.objects, fine, receivers.space, receivers.cells.front, tessellate=tessellate)
+    return split_receivers, np.concatenate(sources)
 
 
 def cell_colours(scene: Scene, receivers: Receivers) -> Colours:

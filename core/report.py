@@ -30,10 +30,7 @@ def make_report(
     objects: tuple[BakedObject, ...],
 ) -> Report:
     """The report.json of the headless contract; reading and writing Blender's data add their own seconds."""
-    rays = dict(survey.rays)
-    for half in halves:
-        for purpose, count in half.rays.items():
-            rays[purpose] = rays.get(purpose, 0) + count
+    rays = sum((half.rays for half in halves), survey.rays)
     return Report(
         seconds={"total": clock.elapsed, **clock.seconds},
         patches=len(patches),

@@ -66,10 +66,14 @@ def _halved(pixels: Float32) -> Float32:
 
 @dataclass(frozen=True)
 class Surface:
-    """A diffuse material. Both sides reflect and both sides emit, as in Cycles.
+    """A material. Both sides are alike, as in Cycles.
 
-    albedo: reflected share per channel, 0 to 1. emission: emitted radiance per channel, W/(m^2 sr). A texture
-    multiplies them, point by point.
+    opacity: share of the light that meets the material at all, 0 to 1; the rest goes straight through, tinted by
+    `transparent`. All else is of the opaque part: shares per channel that are reflected diffusely (albedo), leave
+    diffusely on the other side (transmission), are mirrored (mirror), or meet clear glass (glass), which mirrors a
+    little and lets the rest straight through. emission: emitted radiance per channel, W/(m^2 sr). A texture
+    multiplies albedo and transmission, or emission, point by point. ior: index of
+    refraction of the glass, 1 mirrors nothing. roughness of the mirror, 0 to 1, as in Blender.
     """
 
     name: str
@@ -77,6 +81,32 @@ class Surface:
     emission: RGB = (0.0, 0.0, 0.0)
     albedo_texture: Texture | None = None
     emission_texture: Texture | None = None
+    opacity: float = 1.0
+    transparent: RGB = (1.0, 1.0, 1.0)
+    transmission: RGB = (0.0, 0.0, 0.0)
+    mirror: RGB = (0.0, 0.0, 0.0)
+    glass: RGB = (0.0, 0.0, 0.0)
+    ior: float = 1.0
+    roughness: float = 0.0
+
+    @property
+    def scattered(self) -> RGB:
+        """Share of the arriving light that leaves the front diffusely, wherever it arrived; see `front_share`."""
+        red, green, blue = (self.opacity * (a + t) for a, t in zip(self.albedo, self.transmission, strict=True))
+        return (red, green, blue)
+
+    @property
+    def front_share(self) -> RGB:
+        """How much of that arrived on the front: the light that counts is this share of the front's and the rest of the
+        back's."""
+        red, green, blue = (a / (a + t) if t > 0 else 1.0 for a, t in zip(self.albedo, self.transmission, strict=True))
+        return (red, green, blue)
+
+    @property
+    def emitted(self) -> RGB:
+        """Radiance that the surface emits where it covers `opacity` of what is behind it."""
+        red, green, blue = (self.opacity * channel for channel in self.emission)
+        return (red, green, blue)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +115,8 @@ class SceneObject:
 
     vertices (v, 3) float64, triangles (t, 3) int32 into vertices, counter-clockwise seen from the front,
     surface (t,) int32 into Scene.surfaces. corner_normals (t, 3, 3) float32 are the shading normals of each triangle's
-    corners; None shades flat. A receiver is what gets a baked attribute; all objects block and bounce light.
+    corners; None shades flat. A receiver is what gets a baked attribute; all objects block and bounce light, but those
+    without casts_shadow do not stand between a lamp and what it shines on.
     uv (t, 3, 2) float32: place of each triangle's corners in the textures of its own surface; needed where that has
     any. colors (t, 3, 3) float32: corner colours that multiply the albedo. present: it blocks and bounces light; a
     receiver that is not lies in the light and leaves no trace there. size: longest edge that its triangles may have
@@ -102,6 +133,7 @@ class SceneObject:
     colors: Float32 | None = None
     present: bool = True
     size: float | None = None
+    casts_shadow: bool = True
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,8 @@ def _rows(
     patches: Patches, visibility: Visibility, workers: Workers, estimator: Estimator, purpose: str
 ) -> tuple[Sides, Rows]:
     if estimator == "hemisphere":
-        return hemisphere_rows(patches, visibility, workers, rays=_RAYS, seed=0, purpose=purpose)[:2]
+        found = hemisphere_rows(patches, visibility, workers, rays=_RAYS, seed=0, purpose=purpose)
+        return found.sides, found.rows[0]
     by_pairs = centroid_rows if estimator == "centroid" else analytic_rows
     estimate = by_pairs(patches, visibility, workers, threshold=0.0, seed=0, purpose=purpose)
     return estimate.sides, estimate.rows

@@ -34,6 +34,12 @@ class Sky:
         shines = int(max(sky) > 0)
         return Sky(1, 1, np.ones((1, shines), dtype=np.float32), np.pi * np.array([sky] * shines).reshape(-1, 3))
 
+    def in_colour(self, coloured: bool) -> Sky:
+        """The same sky with three channels, if what rays bring may be tinted on their way."""
+        if not coloured or self.light.shape[1] != 1:
+            return self
+        return Sky(self.rows, self.columns, (self.light * self.irradiance).astype(np.float32), np.eye(3))
+
     def texel(self, directions: Float32) -> Int32:
         """Number of the texel (n,) that each unit vector (n, 3) points to."""
         if len(self.light) == 1:

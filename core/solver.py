@@ -6,7 +6,7 @@ reflect. Albedo stands on the receiver's side, so black surfaces and zero channe
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +18,8 @@ from .scene import Float64
 #: Shooting passes before the finish: what the first bounces bring is what a person watches.
 _WATCHED_PASSES = 2
 _MAXIMUM_ITERATIONS = 200
+#: Former directions that a new one is made independent of.
+_REMEMBERED = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,6 +122,37 @@ def _conjugate_gradients(
         bound = _relative(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
     irradiance = direct + factors.apply(root * z, workers)
     return Solution(np.maximum(irradiance, 0.0), _WATCHED_PASSES + iteration, bound)
+
+
+def solve_both_sides(
+    returning: Callable[[Float64], Float64], area: Float64, direct: Float64, q: float, tolerance: float
+) -> Solution:
+    """Irradiance H (s, c) with H = direct + returning(H), where surfaces reflect and transmit diffusely.
+
+    returning: F R, with R the symmetric matrix of albedos on the diagonal and transmissions between the two sides of a
+    patch. Where more is transmitted than reflected R is indefinite, and no root of it makes the system symmetric and
+    positive definite. But F is self-adjoint and at most 1 in the inner product weighed by area (s,), and R at most the
+    largest albedo + transmission: with q < 1 their product, I - F R has a positive definite symmetric part, for which
+    generalised conjugate residuals converge (Eisenstat, Elman, Schultz 1983). What is left of H is at most 1 / (1 - q)
+    times the residual, in the largest norm as well, since the rows of F R sum to at most q.
+    """
+    accumulated, residual = direct.copy(), returning(direct)
+    former: list[tuple[Float64, Float64, Float64]] = []
+    iteration = 0
+    while True:
+        bound = _relative(residual, accumulated) / max(1.0 - q, 1e-12)
+        if bound <= tolerance or iteration == _MAXIMUM_ITERATIONS:
+            return Solution(np.maximum(accumulated, 0.0), iteration, bound)
+        iteration += 1
+        direction = residual
+        image = direction - returning(direction)
+        for old, old_image, energy in former:
+            along = area @ (image * old_image) / energy
+            direction, image = direction - along * old, image - along * old_image
+        energy = np.maximum(area @ (image * image), np.finfo(float).tiny)
+        step = area @ (residual * image) / energy
+        accumulated, residual = accumulated + step * direction, residual - step * image
+        former = [*former[1 - _REMEMBERED :], (direction, image, energy)]
 
 
 def _relative(change: Float64, whole: Float64) -> float:

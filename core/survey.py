@@ -6,6 +6,7 @@ as one half of the transport rays solved them, odd passes as the other half did:
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -57,6 +58,7 @@ def look_up(
     """Tables of what the solved halves send to a ray, by what it meets; None when nothing was solved."""
     if not halves:
         return None
+    sky = sky.in_colour(patches.coloured)
     seen = sky.light.shape[1]
     by_rays = 3 * effort.emitters_by_rays
     return Surroundings(
@@ -75,7 +77,15 @@ def _table(half: Transport, sky: Sky, emitters: bool) -> Float32:
     met = half.by_code(np.concatenate([half.reflected, no_sky, *emission, coarser], axis=1))
     left = np.zeros((len(sky.light), met.shape[1]), dtype=np.float32)
     left[:, 3 : 3 + no_sky.shape[1]] = sky.light
-    return np.concatenate([met, left])
+    table = np.concatenate([met, left])
+    if emitters or not half.mirrored_emission:
+        return table
+    # Shadow rays do not find lamps in mirrors, so rays off mirrors bring what emitting surfaces send out.
+    emitted = half.by_code(np.pi * half.sides.emission)
+    off_mirrors = table.copy()
+    off_mirrors[: len(emitted), :3] += emitted
+    off_mirrors[: len(emitted), -1] += emitted.mean(axis=1)
+    return np.concatenate([table, off_mirrors])
 
 
 def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
@@ -121,7 +131,7 @@ class Survey:
         self.coarser = [np.zeros(count), np.zeros(count)]
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
-        self.rays = {"gather": 0, "shadow": 0}
+        self.rays: Counter[str] = Counter()
         self._light = direct_light
         self._effort = effort
         self._seed = seed
@@ -153,10 +163,10 @@ class Survey:
         """Add the indirect light at the points; which of them (c,) are in sight."""
         half, columns = number % 2, len(around.to_grey)
         table = around.tables[half] if number < 2 else around.tables[half][:, :columns]
-        arriving, deviation, enclosed = gather_indirect(
+        arriving, deviation, enclosed, rays = gather_indirect(
             points, around.hemispheres, table, self._seed, number, self._workers
         )
-        self.rays["gather"] += len(arriving) * around.hemispheres.rays
+        self.rays += rays
         values = arriving[:, :columns]
         if number < 2:
             self.coarser[half] = arriving[:, columns] - values[:, :3].mean(axis=1)
@@ -199,7 +209,7 @@ class Survey:
 
     def _direct(self, points: Points, number: int) -> Illumination:
         light = gather_direct(points, self._light, self._effort.shadow_rays, self._seed, number, self._workers)
-        self.rays["shadow"] += light.rays
+        self.rays += light.rays
         return light
 
     def _add_direct(

@@ -25,7 +25,7 @@ Int64 = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Colours:
-    """Of n places: albedo (n, 3), and emission (n, 3) in W/(m^2 sr)."""
+    """Of n places: albedo (n, 3), all that leaves diffusely on either side, and emission (n, 3) in W/(m^2 sr)."""
 
     albedo: Float64
     emission: Float64
@@ -56,7 +56,7 @@ def mean_colours(
 
 def constant_colours(scene: Scene, surface: Int32) -> Colours:
     """Colours of surfaces (n,) that do not vary."""
-    albedo, emission = (np.array([getattr(s, name) for s in scene.surfaces]) for name in ("albedo", "emission"))
+    albedo, emission = (np.array([getattr(s, name) for s in scene.surfaces]) for name in ("scattered", "emitted"))
     return Colours(albedo[surface], emission[surface])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,7 @@ from .plan import Effort, Plan
 from .sampling import stream
 from .scene import Float32, Float64
 from .sky import Sky
-from .solver import Solution, shoot_until, solve
+from .solver import Solution, contraction, shoot_until, solve, solve_both_sides
 from .visibility import Visibility
 
 _CHUNK = 1024
@@ -27,20 +28,23 @@ _CHUNK = 1024
 class Transport:
     """Solved light on patch sides.
 
-    escape (s,): share of a side's hemisphere that is open. incoming (s, 3): irradiance W/m^2 straight from the sources.
-    rays cast, by purpose.
+    escape, lost (s, 1) or (s, 3): shares of a side's hemisphere that are open, and that mirrors and glass swallow.
+    incoming (s, 3): irradiance W/m^2 straight from the sources. rays cast, by purpose. mirrored_emission: whether rays
+    saw emitting surfaces in mirrors.
     """
 
     sides: Sides
     escape: Float64
+    lost: Float64
     incoming: Float64
     solution: Solution
-    rays: dict[str, int]
+    rays: Counter[str]
+    mirrored_emission: bool = False
 
     @property
     def reflected(self) -> Float64:
-        """(s, 3) radiosity W/m^2: albedo times irradiance."""
-        return self.sides.albedo * self.solution.irradiance
+        """(s, 3) radiosity W/m^2: albedo times irradiance, and what comes through from the other side."""
+        return reflected(self.sides, self.solution.irradiance)
 
     def by_code(self, values: Float64) -> Float32:
         """Values (s, k) of sides as a table over ray codes but those of the sky; nothing for lost rays and unreached
@@ -65,21 +69,32 @@ class Transport:
         metres = self.sides.patches.space.metres
         area = self.sides.area[:, None] * metres**2 / 3.0
         emitted = float(np.sum(area * self.incoming))
-        absorbed = float(np.sum(area * (self.solution.irradiance - self.reflected)))
-        escaped = float(np.sum(area * self.escape[:, None] * self.reflected))
+        absorbed = float(np.sum(area * (self.solution.irradiance - self.reflected + self.lost * self.reflected)))
+        escaped = float(np.sum(area * self.escape * self.reflected))
         residual = emitted - absorbed - escaped
         return {"emitted": emitted, "absorbed": absorbed, "escaped": escaped, "residual": residual}
 
 
 @dataclass(frozen=True, eq=False)
 class Exchange:
-    """Light between sides: exchange areas G_ij or plain rows F_ij, what escapes, and the rays cast."""
+    """Light between sides: exchange areas G_ij or plain rows F_ij, one matrix for each channel if anything on the way
+    is coloured; what escapes; the shares (s, 1) or (s, 3) that are lost to mirrors and glass; irradiance (s, 3) from
+    emitting surfaces off mirrors, or None; and the rays cast, by purpose."""
 
     sides: Sides
-    rows: Rows
+    rows: tuple[Rows, ...]
     opening: Opening
-    rays: int
+    lost: Float64
+    glints: Float64 | None
+    rays: Counter[str]
     reciprocal: bool
+
+
+def reflected(sides: Sides, irradiance: Float64) -> Float64:
+    """Radiosity (s, 3) W/m^2 that irradiance (s, 3) on both sides of all patches brings forth."""
+    if sides.patches.transmission is None:
+        return sides.albedo * irradiance
+    return sides.albedo * irradiance + sides.transmitted(irradiance)
 
 
 def solve_halves(
@@ -95,7 +110,7 @@ def solve_halves(
     if not plan.looks_around:
         return ()
     if not plan.active("bounces"):
-        patches = replace(patches, albedo=np.zeros_like(patches.albedo))
+        patches = replace(patches, albedo=np.zeros_like(patches.albedo), transmission=None)
     return tuple(
         make_transport(patches, visibility, direct_light, sky, plan.effort, workers, seed=seed, purpose=half)
         for half in ("first half", "second half")
@@ -117,20 +132,62 @@ def make_transport(
 
     `purpose` names the streams of random numbers: two purposes give two independent answers to one question.
     """
+    sky = sky.in_colour(patches.coloured)
     exchange = estimate_exchange(patches, visibility, effort, workers, seed, purpose, sky)
     sides = exchange.sides
     incoming, shadow_rays = light_on_sides(sides, direct_light, workers, effort.shadow_rays, seed, purpose)
     incoming += exchange.opening.light @ sky.irradiance
     if effort.emitters_by_rays:
-        rows = exchange.rows.scaled(1.0 / sides.area) if exchange.reciprocal else exchange.rows
-        incoming += rows.apply(np.pi * sides.emission, workers)
+        incoming += _received(exchange, np.pi * sides.emission, workers)
+    elif exchange.glints is not None:
+        incoming += exchange.glints
+    solution = _solve(exchange, incoming, effort.tolerance, workers)
+    return Transport(
+        sides,
+        exchange.opening.share.reshape(exchange.lost.shape),
+        exchange.lost,
+        incoming,
+        solution,
+        exchange.rays + shadow_rays,
+        mirrored_emission=exchange.glints is not None,
+    )
+
+
+def _received(exchange: Exchange, radiosity: Float64, workers: Workers) -> Float64:
+    """Irradiance (s, 3) from the radiosity (s, 3) of all sides."""
+    area = exchange.sides.area
+    factors = [rows.scaled(1.0 / area) if exchange.reciprocal else rows for rows in exchange.rows]
+    if len(factors) == 1:
+        return factors[0].apply(radiosity, workers)
+    channels = zip(factors, radiosity.T, strict=True)
+    return np.stack([rows.apply(channel, workers) for rows, channel in channels], axis=1)
+
+
+def _solve(exchange: Exchange, incoming: Float64, tolerance: float, workers: Workers) -> Solution:
+    sides, rows = exchange.sides, exchange.rows
     albedo = sides.albedo.astype(np.float64)
-    if exchange.reciprocal:
-        solution = solve(exchange.rows, sides.area, albedo, incoming, effort.tolerance, workers)
-    else:
-        solution = shoot_until(exchange.rows, albedo, incoming, effort.tolerance, workers)
-    rays = {"transport": exchange.rays, "shadow": shadow_rays}
-    return Transport(sides, exchange.opening.share, incoming, solution, rays)
+    if not exchange.reciprocal:
+        return shoot_until(rows[0], albedo, incoming, tolerance, workers)
+    if sides.patches.transmission is not None:
+
+        def returning(irradiance: Float64) -> Float64:
+            return _received(exchange, reflected(sides, irradiance), workers)
+
+        most = albedo + sides.patches.transmission[sides.patch]
+        q = max(contraction(matrix.scaled(1.0 / sides.area), most) for matrix in rows)
+        return solve_both_sides(returning, sides.area, incoming, q, tolerance)
+    if len(rows) == 1:
+        return solve(rows[0], sides.area, albedo, incoming, tolerance, workers)
+    channels = [slice(c, c + 1) for c in range(3)]
+    solved = [
+        solve(matrix, sides.area, albedo[:, c], incoming[:, c], tolerance, workers)
+        for matrix, c in zip(rows, channels, strict=True)
+    ]
+    return Solution(
+        np.concatenate([s.irradiance for s in solved], axis=1),
+        max(s.iterations for s in solved),
+        max(s.bound for s in solved),
+    )
 
 
 def estimate_exchange(
@@ -138,27 +195,33 @@ def estimate_exchange(
 ) -> Exchange:
     """Rows of form factors, made reciprocal and closed together; the centroid baseline stays as it comes."""
     if effort.estimator == "hemisphere":
-        sides, rows, opening = hemisphere_rows(
+        found = hemisphere_rows(
             patches, visibility, workers, rays=effort.transport_rays, seed=seed, purpose=purpose, sky=sky
         )
-        samples = np.full(len(rows), float(effort.transport_rays))
-        exchange = balance(symmetric_exchange(rows, sides.area, samples), sides.area * (1.0 - opening.share), workers)
-        return Exchange(sides, exchange, opening, len(rows) * effort.transport_rays, reciprocal=True)
+        area, samples = found.sides.area, np.full(len(found.sides.side), float(effort.transport_rays))
+        lost = found.lost.reshape(len(area), -1)
+        kept = 1.0 - found.opening.share.reshape(lost.shape) - lost
+        rows = tuple(
+            balance(symmetric_exchange(matrix, area, samples), area * share, workers)
+            for matrix, share in zip(found.rows, kept.T, strict=True)
+        )
+        return Exchange(found.sides, rows, found.opening, lost, found.glints, found.rays, reciprocal=True)
     estimator = analytic_rows if effort.estimator == "analytic" else centroid_rows
     estimate = estimator(patches, visibility, workers, threshold=effort.threshold, seed=seed, purpose=purpose, sky=sky)
+    area, opening, rays = estimate.sides.area, estimate.opening, Counter(transport=estimate.rays)
+    nothing = np.zeros((len(area), 1))
     if effort.estimator == "centroid":
-        return Exchange(estimate.sides, estimate.rows, estimate.opening, estimate.rays, reciprocal=False)
-    area = estimate.sides.area
-    exchange = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - estimate.opening.share), workers)
-    return Exchange(estimate.sides, exchange, estimate.opening, estimate.rays, reciprocal=True)
+        return Exchange(estimate.sides, (estimate.rows,), opening, nothing, None, rays, reciprocal=False)
+    matrix = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - opening.share), workers)
+    return Exchange(estimate.sides, (matrix,), opening, nothing, None, rays, reciprocal=True)
 
 
 def light_on_sides(
     sides: Sides, direct_light: DirectLight, workers: Workers, shadow_rays: int, seed: int, purpose: str
-) -> tuple[Float64, int]:
+) -> tuple[Float64, Counter[str]]:
     """Mean irradiance (s, 3) of each side straight from lamps and emitting surfaces, and the rays it took."""
 
-    def work(number: int, part: slice) -> tuple[Float64, int]:
+    def work(number: int, part: slice) -> tuple[Float64, Counter[str]]:
         rng = stream(seed, "light on sides " + purpose, number)
         normals = sides.normals[part].reshape(-1, 3)
         light = direct_light.at(sides.points[part].reshape(-1, 3), normals, normals, shadow_rays, rng)
@@ -167,4 +230,4 @@ def light_on_sides(
         return total / seen.sum(axis=1)[:, None], light.rays
 
     irradiance, rays = zip(*workers.map(work, len(sides.side), _CHUNK), strict=True)
-    return np.concatenate(irradiance), sum(rays)
+    return np.concatenate(irradiance), sum(rays, Counter())

@@ -67,7 +67,7 @@ def _piece(scene: Scene, scene_object: SceneObject, triangle: int, weights: Floa
     surface = scene.surfaces[scene_object.surface[triangle]]
     parent = np.array([triangle], dtype=np.int32)
     if surface.emission_texture is None:
-        radiance = np.array([surface.emission])
+        radiance = np.array([surface.emitted])
     else:
         every = even_points(MEAN_POINTS)
         parts = [point_colours(scene, scene_object, parent, weights[None], p, 1.0 / MEAN_POINTS) for p in every]

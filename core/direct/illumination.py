@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,12 +23,12 @@ MOST_ASKED = 16
 @dataclass(frozen=True, eq=False)
 class Illumination:
     """irradiance (n, 3) W/m^2 and its variance (n, 3); signature (n,) int64: equal numbers see the same lights whole,
-    and -1 sees some light in part; rays cast."""
+    and -1 sees some light in part; rays cast, by purpose."""
 
     irradiance: Float64
     variance: Float64
     signature: np.ndarray
-    rays: int
+    rays: Counter[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,12 +45,16 @@ class _Receivers:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What ways (r, n) to a light bring: weights, of which so much arrived; free of occluders; rays cast."""
+    """What ways (r, n) to a light bring: weights, of which so much arrived (k, r, n) and passed occluders and veils, in
+    one for all channels or, where there are veils, in each; free of occluders; clear of veils too; rays cast, by
+    purpose."""
 
     weights: Float32
     arrived: Float32
+    passed: Bool | Float32
     free: Bool
-    rays: int
+    clear: Bool
+    rays: Counter[str]
 
 
 class DirectLight:
@@ -94,11 +99,13 @@ class DirectLight:
         halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
         look = self._look(light, tally.receivers.only(lit), _lattices(halves, per_half, len(lit), rng))
         shape = (halves, per_half, len(lit))
-        seen = _seen(share, look.weights.reshape(shape).mean(axis=1), look.arrived.reshape(shape).mean(axis=1))
-        tally.irradiance[lit] += seen.mean(axis=0)[:, None] * light.color
+        weights, arrived = look.weights.reshape(shape).mean(axis=1), look.arrived.reshape(-1, *shape).mean(axis=2)
+        # (halves, n, 1), or one for each channel.
+        seen = np.stack([_seen(share, weights, channel) for channel in arrived], axis=2)
+        tally.irradiance[lit] += seen.mean(axis=0) * light.color
         if halves == 2:
-            tally.variance[lit] += ((seen[0] - seen[1])[:, None] * light.color) ** 2 / 4.0
-        whole = look.free.all(axis=0)
+            tally.variance[lit] += ((seen[0] - seen[1]) * light.color) ** 2 / 4.0
+        whole = look.clear.all(axis=0)
         tally.signature[lit] += np.where(whole, name, 0)
         tally.partly[lit] |= look.free.any(axis=0) & ~whole
         tally.rays += look.rays
@@ -116,7 +123,7 @@ class DirectLight:
         others = np.where(sure, 0.0, chance)
         drawn = np.stack([draw(others, rng.random(len(points))) for _ in range(2)])
         arrived, expected = np.zeros((2, 2, len(points), 3))
-        free, asked = np.zeros((2, len(points)), dtype=np.int64)
+        free, clear, asked = np.zeros((3, len(points)), dtype=np.int64)
         for number, (light, name) in enumerate(zip(self.lights, self._names, strict=True)):
             lit = np.flatnonzero(sure[number])
             self._ask(tally, light, name, shares[number, lit], lit, rays, rng)
@@ -128,17 +135,18 @@ class DirectLight:
             scale = color[number] / chance[number, lit][:, None]
             # A way without size brings exactly the share, however its length was rounded.
             whole = look.weights.mean(axis=0) if light.sized else shares[number, lit]
-            part = look.arrived.mean(axis=0) if light.sized else whole * look.free[0]
+            part = look.arrived.mean(axis=1) if light.sized else whole * look.passed[:, 0]
             expected[half, lit] += whole[:, None] * scale
-            arrived[half, lit] += part[:, None] * scale
+            arrived[half, lit] += part.T * scale
             np.add.at(free, lit, look.free.sum(axis=0))
+            np.add.at(clear, lit, look.clear.sum(axis=0))
             np.add.at(asked, lit, count)
             tally.rays += look.rays
         every = np.einsum("ln,lk->nk", np.where(sure, 0.0, shares), color)
         seen = _seen_in_all(every, expected, arrived)
         tally.irradiance += seen.mean(axis=0)
         tally.variance += (seen[0] - seen[1]) ** 2 / 4.0
-        tally.partly |= (free > 0) & (free < asked)
+        tally.partly |= (free > 0) & (clear < asked)
 
     def _look(self, light: Light, receivers: _Receivers, unit: Float32) -> _Look:
         """Look along the ways to a light. Those that bring nothing count as free, for no ray is cast along them."""
@@ -155,8 +163,17 @@ class DirectLight:
             free |= above
         sample, point = np.nonzero(above & ~free)
         directions = np.ascontiguousarray(towards[:, sample, point].T)
-        free[sample, point] = self._visibility.unblocked_along(receivers.origins[point], directions)
-        return _Look(weights, brings * free, free, len(sample))
+        origins = receivers.origins[point]
+        unblocked = self._visibility.unblocked_along(origins, directions)
+        free[sample, point] = unblocked
+        rays = Counter(shadow=len(sample))
+        if not self._visibility.veiled:
+            return _Look(weights, (brings * free)[None], free[None], free, free, rays)
+        veiled = self._visibility.veiled_along(origins[unblocked], directions[unblocked])
+        passed = np.tile(free, (3, 1, 1)).astype(np.float32)
+        passed[:, sample[unblocked], point[unblocked]] = veiled.tint.T
+        rays += Counter({"onward": veiled.onward, "cut off": veiled.cut})
+        return _Look(weights, brings * passed, passed, free, (passed == 1).all(axis=0), rays)
 
 
 class _Tally:
@@ -168,7 +185,7 @@ class _Tally:
         self.irradiance, self.variance = np.zeros((2, count, 3))
         self.signature = np.zeros(count, dtype=np.int64)
         self.partly = np.zeros(count, dtype=bool)
-        self.rays = 0
+        self.rays: Counter[str] = Counter()
 
     def illumination(self) -> Illumination:
         signature = np.where(self.partly, -1, self.signature)

@@ -5,7 +5,9 @@ Rows sum to at most one by construction, nothing is singular, and the cost is li
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, fields
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +54,9 @@ class Sides:
 
     @property
     def area(self) -> Float64:
-        """(s,) in the unit box, of the open part."""
-        return self.patches.patch_area[self.patch] * (1.0 - self.hidden.mean(axis=1))
+        """(s,) in the unit box, of the open part on which rays stop."""
+        open_area = self.patches.patch_area[self.patch] * (1.0 - self.hidden.mean(axis=1))
+        return open_area if self.patches.coverage is None else open_area * self.patches.coverage[self.patch]
 
     @property
     def albedo(self) -> Float32:
@@ -62,6 +65,42 @@ class Sides:
     @property
     def emission(self) -> Float32:
         return self.patches.emission[self.patch]
+
+    def transmitted(self, irradiance: Float64) -> Float64:
+        """Radiosity (s, 3) from irradiance (s, 3) on the other side of each patch; 0 if nothing transmits."""
+        transmission = self.patches.transmission
+        if transmission is None:
+            return np.zeros_like(irradiance)
+        through = np.zeros((2 * len(self.patches), irradiance.shape[1]))
+        through[self.side] = irradiance
+        other = (self.side + len(self.patches)) % (2 * len(self.patches))
+        return np.asarray(transmission[self.patch] * through[other])
+
+
+@dataclass(frozen=True, eq=False)
+class Opening:
+    """How open some sides are to the sky: share (s,) of the rays that escapes, or (s, 3) where they are tinted, and
+    light (s, k), the mean over all rays of what Sky.light says they bring."""
+
+    share: Float64
+    light: Float64
+
+    def scaled(self, factors: Float64) -> Opening:
+        """The same with all of side i times factors[i]."""
+        return Opening(self.share * factors, self.light * factors[:, None])
+
+
+class Exchanged(NamedTuple):
+    """What the rays of some sides (s,) found. rows: form factors; one matrix for each channel if anything on the way is
+    coloured. opening: what leaves the scene. lost (s,) or (s, 3): share that mirrors and glass swallow. glints (s, 3):
+    irradiance from emitting surfaces off mirrors, None if there is none. rays: how many it took, by purpose."""
+
+    sides: Sides
+    rows: tuple[Rows, ...]
+    opening: Opening
+    lost: Float64
+    glints: Float64 | None
+    rays: Counter[str]
 
 
 def site_points(patches: Patches, side: Int32, shift: Float64) -> tuple[Float64, Float64]:
@@ -83,17 +122,17 @@ def site_points(patches: Patches, side: Int32, shift: Float64) -> tuple[Float64,
 
 def hemisphere_rows(
     patches: Patches, visibility: Visibility, workers: Workers, *, rays: int, seed: int, purpose: str, sky: Sky = DARK
-) -> tuple[Sides, Rows, Opening]:
+) -> Exchanged:
     """Form factors between the sides of patches, from `rays` rays a side; and what of them leaves the scene.
 
-    Fronts are always sampled. Backs are sampled once a ray has met them, then what those meet, until nothing new is
-    met.
+    Fronts are always sampled, and both sides of what transmits. Backs are sampled once a ray has met them, then what
+    those meet, until nothing new is met. What only lets through or mirrors has no light of its own and no sides.
     """
     count = len(patches)
     hemispheres = Hemispheres(patches, visibility, rays // SITES, stream(seed, "patterns " + purpose), sky)
-    fresh = np.arange(count, dtype=np.int32)
+    fresh = _first_sides(patches)
     met = np.zeros(2 * count, dtype=bool)
-    met[:count] = True
+    met[fresh] = True
     looks: list[_Look] = []
     while len(fresh):
         looks.append(_look_around(patches, fresh, hemispheres, workers, seed, f"{purpose} {len(looks)}"))
@@ -106,28 +145,38 @@ def hemisphere_rows(
     number = np.full(2 * count, -1, dtype=np.int32)
     number[look.side] = np.arange(len(look.side), dtype=np.int32)
     counted = (~look.hidden).sum(axis=1) * hemispheres.rays
-    weights = (look.hits / np.repeat(counted, look.length)).astype(np.float32)
-    rows = Rows(np.concatenate([[0], np.cumsum(look.length)]).astype(np.int64), number[look.column], weights)
-    return sides, _mutual(rows, sides.back), Opening(look.escaped / counted, look.skylight / counted[:, None])
+    pointers = np.concatenate([[0], np.cumsum(look.length)]).astype(np.int64)
+    columns = number[look.column]
+    # One column of hits for each channel, or one for all.
+    weights = np.atleast_2d(look.hits.T / np.repeat(counted, look.length)).astype(np.float32)
+    rows = tuple(Rows(pointers, columns, channel) for channel in weights)
+    cast = Counter(transport=len(look.side) * rays)
+    if patches.optics is None:
+        opening = Opening(look.escaped / counted, look.skylight / counted[:, None])
+        return Exchanged(sides, (_mutual(rows[0], sides.back),), opening, np.zeros(len(look.side)), None, cast)
+    opening = Opening((look.escaped.T / counted).T, look.skylight / counted[:, None])
+    lost = 1.0 - opening.share - np.stack([r.row_sums() for r in rows], axis=1).reshape(opening.share.shape)
+    glints = np.pi * look.glints / counted[:, None] if look.glints.any() else None
+    cast += Counter({"onward": int(look.onward.sum()), "cut off": int(look.cut.sum())})
+    rows = tuple(_mutual(matrix, sides.back) for matrix in rows)
+    return Exchanged(sides, rows, opening, np.maximum(lost, 0.0), glints, cast)
 
 
-@dataclass(frozen=True, eq=False)
-class Opening:
-    """How open some sides are to the sky: share (s,) of the rays that escapes, and light (s, k), the mean over all rays
-    of what Sky.light says they bring."""
-
-    share: Float64
-    light: Float64
-
-    def scaled(self, factors: Float64) -> Opening:
-        """The same with all of side i times factors[i]."""
-        return Opening(self.share * factors, self.light * factors[:, None])
+def _first_sides(patches: Patches) -> Int32:
+    """All fronts, and the backs of what transmits; but nothing at which no ray stops."""
+    count = len(patches)
+    stops = np.ones(count, dtype=bool) if patches.coverage is None else patches.coverage > 0.0
+    chosen = np.concatenate([stops, np.zeros(count, dtype=bool)])
+    if patches.transmission is not None:
+        chosen[count:] = stops & (patches.transmission > 0.0).any(axis=1)
+    return np.flatnonzero(chosen).astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False)
 class _Look:
     """What the rays of some sides met: the sides with their sites, how many entries each has, the side met (global
-    number) and the hits on it, the rays that escaped, and the sum of the light that they brought (s, k)."""
+    number), the hits on it and the rays that escaped, tinted (., 3) if anything is; the sum of the light that these
+    brought (s, k); emission (s, 3) seen in mirrors; and for each chunk the rays that went on, and those cut off."""
 
     side: Int32
     points: Float64
@@ -135,9 +184,12 @@ class _Look:
     hidden: Bool
     length: Index
     column: Int32
-    hits: Index
-    escaped: Index
+    hits: Index | Float64
+    escaped: Index | Float64
     skylight: Float64
+    glints: Float64
+    onward: Index
+    cut: Index
 
 
 def _look_around(
@@ -150,28 +202,47 @@ def _look_around(
     texels = np.full(len(light), escaped)
     side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [ignored], texels]).astype(np.int32)
     points, normals = site_points(patches, side, stream(seed, "sites " + purpose).random((len(side), 1, 3)))
+    tinted = patches.optics is not None and patches.optics.tinted
+    glows = patches.optics is not None and bool(patches.emission.any())
 
-    def work(number: int, part: slice) -> tuple[Bool, Index, Int32, Index, Index, Float64]:
+    def work(number: int, part: slice) -> tuple[Any, ...]:
         rng = stream(seed, "rows " + purpose, number)
         origins, axes = points[part].reshape(-1, 3), normals[part].reshape(-1, 3)
-        met = hemispheres.cast(origins, axes, axes, rng).reshape(-1, SITES, hemispheres.rays)
+        looks = hemispheres.cast(origins, axes, axes, rng)
+        met = looks.code.reshape(-1, SITES, hemispheres.rays)
         hidden = _hidden(((met >= codes.triangles) & (met < codes.lost)).mean(axis=2))
+        if patches.transmission is not None:
+            # Both sides of what transmits are coupled patch by patch, so both are open.
+            hidden &= ~(patches.transmission[side[part] % len(patches)] > 0.0).any(axis=1)[:, None]
         columns = side_of_code[met]
         columns[hidden] = ignored
         columns = columns.reshape(len(met), -1)
-        skylight = _light_of_escaped(light, met.reshape(len(met), -1) - codes.escaped, columns == escaped)
-        columns.sort(axis=1)
-        return hidden, *_run_lengths(columns, escaped), skylight
+        tint = None if looks.tint is None else looks.tint.reshape(*columns.shape, 3)
+        glints = np.zeros((len(met) if glows else 0, 3))
+        if glows and looks.mirrored is not None:
+            seen = looks.mirrored.reshape(columns.shape) & (columns < escaped)
+            ray = np.flatnonzero(seen)
+            radiance = patches.emission[columns.reshape(-1)[ray] % len(patches)]
+            shown = radiance if tint is None else radiance * tint.reshape(-1, 3)[ray]
+            np.add.at(glints, ray // columns.shape[1], shown)
+        texel = met.reshape(len(met), -1) - codes.escaped
+        skylight = _light_of_escaped(light, texel, columns == escaped, tint)
+        if not tinted:
+            columns.sort(axis=1)
+        entries = _tinted_lengths(columns, tint, escaped) if tinted else _run_lengths(columns, escaped)
+        return hidden, *entries, skylight, glints, np.array([looks.onward]), np.array([looks.cut])
 
     chunk = max(1, hemispheres.chunk // SITES)
     parts = zip(*workers.map(work, len(side), chunk), strict=True)
     return _Look(side, points, normals, *(np.concatenate(p) for p in parts))
 
 
-def _light_of_escaped(light: Float32, texel: Int32, escaped: Bool) -> Float64:
-    """Sums (n, k) of light (texels, k) over the escaped among the rays (n, r) of each side."""
+def _light_of_escaped(light: Float32, texel: Int32, escaped: Bool, tint: Float32 | None) -> Float64:
+    """Sums (n, k) of light (texels, k) over the escaped among the rays (n, r) of each side, tinted (n, r, k)."""
     side = np.nonzero(escaped)[0]
     brought = light[texel[escaped]]
+    if tint is not None and brought.size:
+        brought *= tint[escaped]
     sums = [np.bincount(side, channel, len(texel)) for channel in brought.T]
     return np.stack(sums, axis=1) if sums else np.zeros((len(texel), 0))
 
@@ -196,6 +267,20 @@ def _run_lengths(columns: Int32, escaped: int) -> tuple[Index, Int32, Index, Ind
     kept = column < escaped
     length = np.bincount(start[kept] // rays, minlength=len(columns))
     return length, column[kept], hits[kept], np.count_nonzero(columns == escaped, axis=1)
+
+
+def _tinted_lengths(columns: Int32, tint: Float32 | None, escaped: int) -> tuple[Index, Int32, Float64, Float64]:
+    """The same for rays that bring tints (n, k, 3), None where all are one: hits and escaped rays count by them."""
+    weight = np.ones((*columns.shape, 3), dtype=np.float32) if tint is None else tint
+    order = np.argsort(columns, axis=1, kind="stable")
+    columns = np.take_along_axis(columns, order, axis=1)
+    weight = np.take_along_axis(weight, order[:, :, None], axis=1).astype(np.float64)
+    length, column, _, _ = _run_lengths(columns, escaped)
+    new = np.ones(columns.shape, dtype=bool)
+    new[:, 1:] = columns[:, 1:] != columns[:, :-1]
+    start = np.flatnonzero(new)
+    hits = np.add.reduceat(weight.reshape(-1, 3), start, axis=0)[columns.reshape(-1)[start] < escaped]
+    return length, column, hits, np.einsum("nk,nkc->nc", columns == escaped, weight)
 
 
 def _mutual(rows: Rows, back: Bool) -> Rows:

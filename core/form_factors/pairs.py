@@ -142,9 +142,8 @@ def rows_by_pairs(
 
     Pairs whose form factors stay below `threshold` both ways are culled before any ray is cast.
     """
-    sides, _, probed = hemisphere_rows(
-        patches, visibility, workers, rays=_PROBES, seed=seed, purpose=f"probe {purpose}", sky=sky
-    )
+    probe = hemisphere_rows(patches, visibility, workers, rays=_PROBES, seed=seed, purpose=f"probe {purpose}", sky=sky)
+    sides, probed = probe.sides, probe.opening
     faces = Faces.of(sides)
     area = sides.area
 

@@ -29,13 +29,16 @@ def everything(build) -> Scene:
     )
     glow = build.quad("glow", (-1, -1, 2), (0, 0.5, 0), (0.5, 0, 0), surface=1, receives=False)
     floor = build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
+    veil = build.quad("veil", (0.9, -1, 0), (0, 0.2, 0), (0, 0, 0.2), surface=2, receives=False)
     image = Texture(np.random.default_rng(1).random((4, 4, 3), dtype=np.float32))
+    quarter = (0.25, 0.25, 0.25)
     surfaces = (
         replace(build.grey, albedo_texture=image),
         Surface("glow", (0, 0, 0), (0, 5.0, 5.0), emission_texture=image),
+        Surface("veil", quarter, opacity=0.5, transmission=quarter, mirror=quarter, glass=quarter),
     )
     uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], dtype=np.float32)
-    return Scene((replace(floor, uv=uv), replace(glow, uv=uv)), surfaces, lamps, sky=(0.5, 0, 0.5))
+    return Scene((replace(floor, uv=uv), replace(glow, uv=uv), veil), surfaces, lamps, sky=(0.5, 0, 0.5))
 
 
 def light(scene, **asked):

@@ -33,12 +33,13 @@ def look(patches, point, normal, rays=4096, shading=None, count=50):
     where = np.tile(patches.space.normalise(np.array(point, float)), (count, 1))
     normals = np.tile(np.array(normal, float), (count, 1))
     shading = normals if shading is None else np.tile(np.array(shading, float), (count, 1))
-    return looker(patches, rays).cast(where, normals, shading, np.random.default_rng(1)).ravel()
+    return looker(patches, rays).cast(where, normals, shading, np.random.default_rng(1)).code.ravel()
 
 
 def rows_of(patches, workers, rays, purpose="test"):
     visibility = Visibility(patches.corners)
-    return hemisphere_rows(patches, visibility, workers, rays=rays, seed=0, purpose=purpose)
+    found = hemisphere_rows(patches, visibility, workers, rays=rays, seed=0, purpose=purpose)
+    return found.sides, found.rows[0], found.opening
 
 
 def between_surfaces(sides, rows) -> np.ndarray:
@@ -180,7 +181,7 @@ def test_other_streams_give_other_rays(build, workers):
     patches = build.patches(Scene((build.box(inward=True),), SIX), 100)
     visibility = Visibility(patches.corners)
     one, same, other = (
-        hemisphere_rows(patches, visibility, workers, rays=64, seed=0, purpose=purpose)[1].weights.tobytes()
+        hemisphere_rows(patches, visibility, workers, rays=64, seed=0, purpose=purpose).rows[0].weights.tobytes()
         for purpose in ("one", "one", "two")
     )
     assert one == same != other
@@ -189,4 +190,4 @@ def test_other_streams_give_other_rays(build, workers):
 def test_fewer_rays_look_at_the_same_surroundings(build):
     patches = build.patches(Scene((build.box(inward=True),), SIX), 100)
     few = looker(patches, 64).with_rays(8, stream(0, "few"))
-    assert few.cast(np.zeros((5, 3)), np.tile(UP, (5, 1)), np.tile(UP, (5, 1)), stream(0, "rays")).shape == (5, 8)
+    assert few.cast(np.zeros((5, 3)), np.tile(UP, (5, 1)), np.tile(UP, (5, 1)), stream(0, "rays")).code.shape == (5, 8)

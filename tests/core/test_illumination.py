@@ -125,9 +125,9 @@ def test_lamps_add_up(build):
 
 
 def test_a_point_lamp_takes_one_ray_and_darkness_none(build):
-    assert behind(build, [POINT], tries=7, rays=16).rays == 7
-    assert behind(build, [PANEL], tries=7, rays=16).rays == 7 * 16
-    assert behind(build, [POINT, PANEL], tries=7, normal=(0, 0, -1)).rays == 0
+    assert behind(build, [POINT], tries=7, rays=16).rays.total() == 7
+    assert behind(build, [PANEL], tries=7, rays=16).rays.total() == 7 * 16
+    assert behind(build, [POINT, PANEL], tries=7, normal=(0, 0, -1)).rays.total() == 0
     assert behind(build, [], tries=7).irradiance.max() == 0
 
 

@@ -136,7 +136,7 @@ def test_the_open_part_of_the_ground_is_what_takes_part(build, transport):
     block = build.box("block", (-0.63, -0.41, 0), (0.5, 0.47, 1.2), surface=1)
     surfaces = (build.grey, Surface("block", (0.8, 0.8, 0.8)))
     solved = transport(Scene((ground, block), surfaces, sky=(1.0, 1.0, 1.0)), patches=3000)
-    seen = np.isclose(solved.sides.albedo[:, 0], 0.5) & (solved.escape > 0)
+    seen = np.isclose(solved.sides.albedo[:, 0], 0.5) & (solved.escape[:, 0] > 0)
     metres = solved.sides.patches.space.metres
     straddling = solved.sides.hidden.any(axis=1) & seen
     # Each straddling patch's open share is one of four points': off by at most a half, evenly.
