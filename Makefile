@@ -1,6 +1,7 @@
 # make bake        set up, and bake the Cornell box sample into build/
 # make test        set up, and run every check, on each Python that Blender uses and this machine has
 # make extension   one installable package per platform, in build/extension/
+# make repository  and a listing of them in build/repository/, to put on any web server as an extension repository
 # make test-4.5    the tests on Blender 4.5 as well
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
@@ -9,7 +10,7 @@
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-3.13 test-4.5 lint samples extension accuracy effects test-gui clean
+.PHONY: bake test test-3.13 test-4.5 lint samples extension repository accuracy effects test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
@@ -45,6 +46,9 @@ lint: .venv/ready
 
 extension: .venv/ready
 	.venv/bin/python packaging/build_extension.py
+
+repository: extension
+	.venv/bin/python packaging/build_repository.py
 
 samples: .venv-4.5/ready
 	for script in $$(grep -l __main__ sample_blends/*.py); do .venv-4.5/bin/python $$script || exit 1; done

@@ -211,6 +211,16 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
     mesh.update()
 
 
+def remove_layers(mesh: bpy.types.Mesh) -> None:
+    """Take every layer away that this add-on wrote to a mesh, and all that it has noted there."""
+    for name in dict(mesh.get(OURS_KEY) or {}):
+        if name in mesh.color_attributes:
+            mesh.color_attributes.remove(mesh.color_attributes[name])
+    if OURS_KEY in mesh:
+        del mesh[OURS_KEY]
+        mesh.update()
+
+
 def _put_meshes(
     view_layer: bpy.types.ViewLayer, objects: Sequence[bpy.types.Object], meshes: Sequence[bpy.types.Mesh]
 ) -> list[bpy.types.Object]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
 from time import perf_counter
 
 import bpy
@@ -13,6 +15,7 @@ from ..core.progress import Progress
 from ..core.result import BakeResult
 from ..core.settings import Settings
 from .attribute_writer import ResultMode, check_writable, write
+from .copies import ORIGINAL_KEY
 from .scene_reader import read_scene
 
 
@@ -42,3 +45,67 @@ def bake_objects(
     done = perf_counter()
     result.report.seconds.update(read=read - begun, write=done - baked, total=done - begun)
     return result, written
+
+
+def bake_frames(
+    context: bpy.types.Context,
+    objects: Sequence[bpy.types.Object],
+    settings: Settings,
+    frames: Sequence[int],
+    *,
+    result_mode: ResultMode,
+    attribute: str,
+    progress: Progress | None = None,
+) -> tuple[BakeResult, list[bpy.types.Object]]:
+    """Bake the light of each frame into layers of its own: `<attribute> 0001` and so on.
+
+    Lamps may move and change; the shape is that of the first frame, which all layers share. The report is that of the
+    first frame, with the objects and the seconds of all. Raises as `bake_objects`; frames that are done stay.
+    """
+    scene = context.scene
+    before = scene.frame_current
+    try:
+        scene.frame_set(frames[0])
+        first, written = bake_objects(
+            context,
+            objects,
+            settings,
+            result_mode=result_mode,
+            attribute=frame_attribute(attribute, frames[0]),
+            progress=progress,
+        )
+        with _as_originals(written):
+            for frame in frames[1:]:
+                scene.frame_set(frame)
+                result, _ = bake_objects(
+                    context,
+                    written,
+                    replace(settings, tessellate=False),
+                    result_mode="keep",
+                    attribute=frame_attribute(attribute, frame),
+                    progress=progress,
+                )
+                first.report.objects += result.report.objects
+                for stage, seconds in result.report.seconds.items():
+                    first.report.seconds[stage] = first.report.seconds.get(stage, 0.0) + seconds
+    finally:
+        scene.frame_set(before)
+    return first, written
+
+
+def frame_attribute(attribute: str, frame: int) -> str:
+    """The name of a frame's combined layer."""
+    return f"{attribute} {frame:04d}"
+
+
+@contextmanager
+def _as_originals(copies: Sequence[bpy.types.Object]) -> Iterator[None]:
+    """Within, copies count as objects of their own, so that more light can be written to them as they are."""
+    originals = [(copy, copy[ORIGINAL_KEY]) for copy in copies if copy.get(ORIGINAL_KEY) is not None]
+    for copy, _ in originals:
+        del copy[ORIGINAL_KEY]
+    try:
+        yield
+    finally:
+        for copy, original in originals:
+            copy[ORIGINAL_KEY] = original

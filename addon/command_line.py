@@ -30,7 +30,7 @@ from ..core.scene import SceneError
 from ..core.settings import LAYERS, Settings
 from . import accuracy_plot, accuracy_report, properties, wording
 from .accuracy import Asked, measure
-from .bake_scene import bake_objects
+from .bake_scene import bake_frames, bake_objects, frame_attribute
 from .preview import render_preview
 from .scene_reader import pick_receivers, read_scene
 
@@ -96,14 +96,13 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
     source = _open(options.input)
     compress = _is_compressed(source)
     receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
-    result, baked = bake_objects(
-        bpy.context,
-        receivers,
-        _settings(options),
-        result_mode=options.result,
-        attribute=options.attribute,
-        progress=progress,
-    )
+    how = {"result_mode": options.result, "attribute": options.attribute, "progress": progress}
+    shown = options.attribute
+    if options.frames:
+        result, baked = bake_frames(bpy.context, receivers, _settings(options), options.frames, **how)
+        shown = frame_attribute(options.attribute, options.frames[0])
+    else:
+        result, baked = bake_objects(bpy.context, receivers, _settings(options), **how)
     result.report.version = _version()
     with ExitStack() as unfinished:
         # Entered first, moved into place last: whoever sees the .blend finds the report and the preview beside it.
@@ -113,7 +112,7 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
         _save(blend, compress=compress)
         if options.preview is not None:
             picture = unfinished.enter_context(_moved_into_place(options.preview))
-            render_preview(bpy.context.scene, baked, picture, attribute=options.attribute)
+            render_preview(bpy.context.scene, baked, picture, attribute=shown)
         progress.check()
         if options.output.exists() and options.output.samefile(source):
             shutil.copy2(source, f"{source}1")  # Blender's own habit when it saves over a file
@@ -323,6 +322,12 @@ def _parser() -> argparse.ArgumentParser:
     bake.set_defaults(command=_bake)
     bake.add_argument("--output", type=_file(".blend"), required=True, metavar="OUT.blend", help="the baked file")
     bake.add_argument("--attribute", default="Radiosity", help="name of the colour attribute (Radiosity)")
+    bake.add_argument(
+        "--frames",
+        type=_frames,
+        metavar="1-10",
+        help="bake moving lamps: layers for each frame, 'Radiosity 0001' and on",
+    )
     bake.add_argument("--report", type=_file(""), metavar="FILE.json", help="write what was done and how well")
     bake.add_argument("--preview", type=_file(".png"), metavar="FILE.png", help="render a picture of the baked objects")
     outlook = commands.add_parser("plan", help="what a bake would simulate and cost", description=_plan.__doc__)
@@ -422,6 +427,17 @@ def _layers(text: str) -> tuple[str, ...]:
         if name not in LAYERS:
             raise argparse.ArgumentTypeError(f"unknown layer '{name}': choose from {', '.join(LAYERS)}")
     return tuple(layer for layer in LAYERS if layer == "combined" or layer in names)
+
+
+def _frames(text: str) -> list[int]:
+    """1-10, or 1,5,9, or both together; ascending and each once."""
+    frames: set[int] = set()
+    for part in text.split(","):
+        first, _, last = part.partition("-")
+        frames.update(range(_whole(first), _whole(last or first) + 1))
+    if not frames:
+        raise argparse.ArgumentTypeError(f"there are no frames in {text}: write the first before the last")
+    return sorted(frames)
 
 
 def _positive(text: str) -> float:

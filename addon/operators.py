@@ -19,7 +19,7 @@ from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import bake_scene, checklist, panels, scene_reader, viewport, wording
+from . import attribute_writer, bake_scene, checklist, copies, panels, scene_reader, viewport, wording
 from .job import BakeJob
 from .window_bake import WindowBake
 
@@ -197,6 +197,48 @@ class OBJECT_OT_radiosity_accuracy(bpy.types.Operator):
         return {"FINISHED"}
 
 
+class OBJECT_OT_radiosity_refine(bpy.types.Operator):
+    bl_idname = "object.radiosity_refine"
+    bl_label = "Refine"
+    bl_description = "Ask for half the error, and bake again"
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_bake(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        asked = context.scene.radiosity_baker
+        reached = (asked.last_report() or {}).get("estimated_error", {}).get("total", asked.error / 100.0)
+        asked.goal, asked.error = "ERROR", max(50.0 * reached, 0.1)
+        return bpy.ops.object.radiosity_bake("INVOKE_DEFAULT")
+
+
+class OBJECT_OT_radiosity_clear(bpy.types.Operator):
+    bl_idname = "object.radiosity_clear"
+    bl_label = "Clear Baked Light"
+    bl_description = (
+        "Remove all baked light of this scene: the copies and their collection, and the colour attributes that were "
+        "made. The originals are shown again as they were"
+    )
+    bl_options: ClassVar[set[str]] = {"REGISTER", "UNDO"}
+
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return _can_bake(cls, context)
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        copies.remove_copies(context.view_layer, list(context.view_layer.objects))
+        for obj in context.scene.objects:
+            if obj.type == "MESH" and obj.data.library is None:
+                attribute_writer.remove_layers(obj.data)
+        asked = context.scene.radiosity_baker
+        asked.report = asked.plan = ""
+        if viewport.is_shown(context):
+            viewport.restore(viewport.find_view(context))
+        return {"FINISHED"}
+
+
 def _attempt(operator: bpy.types.Operator, action: Callable[[], set[str] | None]) -> set[str]:
     """Do it; whatever goes wrong reaches the person, and what is not their doing reaches the console too."""
     try:
@@ -281,6 +323,8 @@ OPERATORS = (
     OBJECT_OT_radiosity_switch_effect,
     OBJECT_OT_radiosity_fix,
     OBJECT_OT_radiosity_accuracy,
+    OBJECT_OT_radiosity_refine,
+    OBJECT_OT_radiosity_clear,
 )
 
 

@@ -4,6 +4,7 @@ import bpy
 import pytest
 
 from radiosity_baker.addon import bake_scene
+from radiosity_baker.addon.copies import original_of
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.scene import SceneError
 from radiosity_baker.core.settings import Settings
@@ -46,3 +47,26 @@ def test_what_cannot_be_written_is_refused_before_the_bake(lit_plane, monkeypatc
 
     with pytest.raises(SceneError, match="did not make"):
         run(lit_plane)
+
+
+@pytest.mark.parametrize("mode", ["keep", "new"])
+def test_a_lamp_that_fades_gives_a_layer_for_each_frame(lit_plane, colours, mode):
+    lamp = bpy.data.lights[0]
+    for frame, energy in ((1, 100.0), (3, 25.0)):
+        lamp.energy = energy
+        lamp.keyframe_insert("energy", frame=frame)
+    bpy.context.scene.frame_set(2)
+
+    settings = Settings(tessellate=mode != "keep", triangles=64, error=None)
+    result, (written,) = bake_scene.bake_frames(
+        bpy.context, [lit_plane], settings, [1, 3], result_mode=mode, attribute="Light"
+    )
+
+    assert written.data.color_attributes.keys() == ["Light 0001", "Light 0003"]
+    first, last = (colours(written.data, name).mean() for name in ("Light 0001", "Light 0003"))
+    # A quarter of the power; between two bakes of a preview's 2 %, each.
+    assert last == pytest.approx(first / 4.0, rel=0.05)
+    assert [entry["attribute"] for entry in result.report.objects] == ["Light 0001", "Light 0003"]
+    assert bpy.context.scene.frame_current == 2
+    if mode == "new":
+        assert original_of(bpy.context.view_layer, written) == lit_plane

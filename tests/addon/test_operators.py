@@ -72,6 +72,31 @@ def test_bakes_what_was_asked_for(room, stand_in):
     assert set(room.data.color_attributes.keys()) == {"Glow", "Glow Direct"}
 
 
+@pytest.mark.parametrize("mode", ["NEW", "KEEP"])
+def test_clear_leaves_nothing_of_a_bake(room, stand_in, mode):
+    stand_in()
+    asked = bpy.context.scene.radiosity_baker
+    asked.result, asked.layers = mode, {"direct"}
+
+    def everything():
+        return content(), list(room.keys()), list(room.data.keys()), bpy.data.collections.keys(), room.hide_get()
+
+    before = everything()
+    bpy.ops.object.radiosity_bake()
+    assert everything() != before
+    assert bpy.ops.object.radiosity_clear() == {"FINISHED"}
+    assert everything() == before
+
+
+@pytest.mark.usefixtures("room")
+def test_refine_asks_for_half_of_the_error_that_was_reached(stand_in):
+    stand_in()
+    asked = bpy.context.scene.radiosity_baker
+    bpy.ops.object.radiosity_bake()
+    bpy.ops.object.radiosity_refine()
+    assert asked.error == pytest.approx(0.9)
+
+
 @pytest.mark.usefixtures("room")
 def test_plan_tells_effects_and_cost_and_bakes_nothing():
     objects = bpy.data.objects.keys()
