@@ -10,6 +10,7 @@ from .clock import Clock
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight
 from .direct.lamps import place
+from .direct.sky import split_bright
 from .layers import baked_objects
 from .parallel import Workers
 from .patch_refinement import patches_by_light
@@ -20,7 +21,7 @@ from .receivers import make_receivers
 from .refinement import Light, average_light, refine
 from .report import make_report
 from .result import BakeResult
-from .scene import Scene
+from .scene import Scene, SkyMap
 from .settings import Settings
 from .sky import Sky
 from .survey import Survey, look_up
@@ -40,7 +41,10 @@ def bake(
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
     scene = planned.scene
-    effort, sky = planned.effort, Sky.of(scene.sky)
+    effort = planned.effort
+    apart = isinstance(scene.sky, SkyMap) and planned.active("sky lights")
+    smooth, suns = split_bright(scene.sky) if apart else (scene.sky, ())
+    sky = Sky.of(smooth)
     clock.progress.expected = planned.seconds
 
     def finish(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:
@@ -55,7 +59,7 @@ def bake(
         with clock.stage("tessellate", 0.03):
             space, around = unit_space(scene), scene.surroundings()
             receivers = make_receivers(scene, space, settings, effort.triangles)
-            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
+            lights = [place(lamp, space) for lamp in (*scene.lamps, *suns)] + emitting_panels(around, space)
             if clock.progress.watched:
                 # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
                 coarse = make_patches(around, space, split_objects(around, 1))

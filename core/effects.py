@@ -15,10 +15,12 @@ from typing import Any, Literal
 import numpy as np
 
 from .convexity import nothing_stands_between
+from .direct.sky import split_bright
 from .patches import triangle_geometry
 from .result import Effect
 from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp, Surface
 from .settings import Settings
+from .sky import equal_texels
 from .textures import triangle_colours, varying_albedo, varying_emission
 
 #: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
@@ -100,6 +102,22 @@ def sky(scene: Scene, _: Settings) -> Effect:
     light = scene.sky.pixels if isinstance(scene.sky, SkyMap) else np.array(scene.sky)
     shines = bool(light.max() > 0)
     return Effect("sky", shines, "the world emits light" if shines else "the world is black")
+
+
+def sky_map(scene: Scene, _: Settings) -> Effect:
+    if isinstance(scene.sky, SkyMap):
+        return Effect("sky map", True, "the world looks different from direction to direction")
+    return Effect("sky map", False, "the world is the same in all directions")
+
+
+def sky_lights(scene: Scene, _: Settings) -> Effect:
+    if not isinstance(scene.sky, SkyMap):
+        return Effect("sky lights", False, "the world is the same in all directions")
+    count = len(split_bright(scene.sky)[1])
+    if not count:
+        return Effect("sky lights", False, "nothing in the sky is much brighter than the rest of it")
+    what = "a bright spot is" if count == 1 else f"{count} bright spots are"
+    return Effect("sky lights", True, f"{what} sampled as {'a sun' if count == 1 else 'suns'}")
 
 
 def bounces(scene: Scene, settings: Settings) -> Effect:
@@ -277,6 +295,14 @@ def _without_share(name: str) -> Callable[[Scene], Scene]:
     return lambda scene: _with_surfaces(scene, **{name: (0.0, 0.0, 0.0)})
 
 
+def _with_even_sky(scene: Scene) -> Scene:
+    """The mean of the map in all directions."""
+    if not isinstance(scene.sky, SkyMap):
+        return scene
+    red, green, blue = equal_texels(scene.sky, 1, 1)[0, 0].tolist()
+    return replace(scene, sky=(red, green, blue))
+
+
 def _unchanged(scene: Scene) -> Scene:
     return scene
 
@@ -291,6 +317,8 @@ EFFECTS: dict[str, Rule] = {
     "soft shadows": Rule(soft_shadows, _with_hard_shadows),
     "emitting surfaces": Rule(emitting_surfaces, _without_emission),
     "sky": Rule(sky, _without_sky),
+    "sky map": Rule(sky_map, _with_even_sky),
+    "sky lights": Rule(sky_lights, _unchanged),
     "transparency": Rule(transparency, _opaque),
     "diffuse transmission": Rule(diffuse_transmission, _without_share("transmission")),
     "mirrors": Rule(mirrors, _without_share("mirror")),

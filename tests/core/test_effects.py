@@ -10,7 +10,17 @@ import pytest
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.convexity import nothing_stands_between
 from radiosity_baker.core.effects import EFFECTS, choose_effects
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneError, SpotLamp, SunLamp, Surface, Texture
+from radiosity_baker.core.scene import (
+    AreaLamp,
+    PointLamp,
+    Scene,
+    SceneError,
+    SkyMap,
+    SpotLamp,
+    SunLamp,
+    Surface,
+    Texture,
+)
 from radiosity_baker.core.settings import Settings
 
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -38,7 +48,13 @@ def everything(build) -> Scene:
         Surface("veil", quarter, opacity=0.5, transmission=quarter, mirror=quarter, glass=quarter),
     )
     uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], dtype=np.float32)
-    return Scene((replace(floor, uv=uv), replace(glow, uv=uv), veil), surfaces, lamps, sky=(0.5, 0, 0.5))
+    return Scene((replace(floor, uv=uv), replace(glow, uv=uv), veil), surfaces, lamps, sky=sky_with_a_spot())
+
+
+def sky_with_a_spot() -> SkyMap:
+    pixels = np.full((16, 32, 3), (0.5, 0, 0.5), dtype=np.float32)
+    pixels[12, 5:7] = (50, 0, 0)
+    return SkyMap(pixels)
 
 
 def light(scene, **asked):
