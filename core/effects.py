@@ -23,8 +23,9 @@ from .settings import Settings
 from .sky import equal_texels
 from .textures import triangle_colours, varying_albedo, varying_emission
 
-#: Emitting triangles up to this many are sampled one by one, as lamps are; more are found by the rays that look around.
-MOST_PANELS = 64
+#: Emitting triangles up to this many are sampled one by one, as lamps are. Of more, some are chosen at each point, or,
+#: where they are more than this part of all surfaces, the rays that look around find them.
+MOST_PANELS, LARGE_PART = 64, 0.1
 #: Each kind of lamp, by the name of its effect.
 LAMPS: dict[str, type] = {"point lamps": PointLamp, "spot lamps": SpotLamp, "sun": SunLamp, "area lamps": AreaLamp}
 
@@ -94,7 +95,8 @@ def emitting_surfaces(scene: Scene, _: Settings) -> Effect:
     emitting = emitting_triangles(scene)
     if not emitting:
         return Effect("emitting surfaces", False, "no surface emits")
-    how = "as lamps" if emitting <= MOST_PANELS else "by the rays that look around"
+    many = "by the rays that look around" if emitters_by_rays(scene) else "some of them at each point"
+    how = "as lamps" if emitting <= MOST_PANELS else many
     return Effect("emitting surfaces", True, f"{emitting} triangles emit; sampled {how}")
 
 
@@ -184,6 +186,19 @@ def textured_emission(scene: Scene, _: Settings) -> Effect:
 def emitting_triangles(scene: Scene) -> int:
     """How many triangles emit light."""
     return sum(int(np.count_nonzero(triangle_colours(scene, o).emission.max(axis=1) > 0)) for o in scene.objects)
+
+
+def emitters_by_rays(scene: Scene) -> bool:
+    """Whether rays that look around find the emitting triangles best: these are many, and a large part of all there is
+    to see."""
+    if emitting_triangles(scene) <= MOST_PANELS:
+        return False
+    total = emitting = 0.0
+    for scene_object in scene.objects:
+        area = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
+        total += float(area.sum())
+        emitting += float(area[triangle_colours(scene, scene_object).emission.max(axis=1) > 0].sum())
+    return emitting > LARGE_PART * total
 
 
 def _lamps(name: str, kind: type, scene: Scene) -> Effect:

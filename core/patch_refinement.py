@@ -11,8 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .adaptation import largest
-from .direct.illumination import DirectLight
-from .direct.lamps import Light
+from .direct.illumination import DirectLight, Source
 from .form_factors.hemisphere import SITES, site_points
 from .parallel import Workers
 from .patches import Patches, PatchMeshes, Space, make_patches, split_objects
@@ -33,7 +32,7 @@ _CHUNK = 1024
 
 
 def patches_by_light(
-    scene: Scene, space: Space, lights: list[Light], effort: Effort, seed: int, workers: Workers
+    scene: Scene, space: Space, lights: list[Source], effort: Effort, seed: int, workers: Workers
 ) -> tuple[Patches, Visibility]:
     """About effort.patches patches, and more where direct light varies; and what is visible among them."""
     split = split_objects(scene, effort.patches)

@@ -9,7 +9,7 @@ import numpy as np
 
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
-from .effects import LAMPS, MOST_PANELS, choose_effects, emitting_triangles, goes_on
+from .effects import LAMPS, choose_effects, emitters_by_rays, goes_on
 from .parallel import Workers, thread_count
 from .patches import Space, make_patches, split_objects, unit_space
 from .progress import Progress
@@ -21,7 +21,7 @@ from .tessellation import edge_for_count, predicted_count
 from .visibility import Visibility
 
 #: Effects that need rays over the hemisphere.
-LOOKING = ("bounces", "sky", "emitting surfaces")
+LOOKING = ("bounces", "sky")
 #: What no single effect costs: points, fit and layers.
 REST = "the rest"
 #: Triangles and patches below which a bake shows next to nothing.
@@ -31,6 +31,8 @@ _CALIBRATION_RAYS = 1 << 16
 #: What a ray that looks around, a shadow ray, a cell and a patch side cost, in rays that only meet something: measured
 #: on the sample scenes, as ratios, which machines share better than seconds.
 _RAY_COST, _SHADOW_COST, _CELL_COST, _SIDE_COST = 1.7, 1.5, 180.0, 300.0
+#: Choosing among many emitting triangles costs as much as this many lamps.
+_TREE_COST = 8
 _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 
 
@@ -76,7 +78,7 @@ class Plan:
     @property
     def looks_around(self) -> bool:
         """Whether any effect needs rays over the hemisphere."""
-        return any(self.active(name) for name in LOOKING)
+        return self.effort.emitters_by_rays or any(self.active(name) for name in LOOKING)
 
     def active(self, name: str) -> bool:
         """Whether an effect is simulated."""
@@ -130,7 +132,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),
         threshold=1e-5,
-        emitters_by_rays=emitting_triangles(scene) > MOST_PANELS,
+        emitters_by_rays=emitters_by_rays(scene),
     )
 
 
@@ -146,6 +148,8 @@ def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[dict[str,
     work = dict.fromkeys((*(kind for kind in LAMPS), "emitting surfaces"), 0.0)
     per_light = _SHADOW_COST * effort.shadow_rays * (cells * (effort.passes + 3) + 16 * sides)
     pieces = len(emitting_pieces(scene))
+    if unpriced.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
+        pieces = _TREE_COST
     asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces, 1))
     for name, kind in LAMPS.items():
         work[name] = asked * per_light * sum(isinstance(lamp, kind) for lamp in scene.lamps)
@@ -153,7 +157,7 @@ def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[dict[str,
     if unpriced.looks_around:
         around = 2 * sides * effort.transport_rays + cells * effort.passes * effort.gather_rays
         # One look serves all that it may meet: it counts for the first of them.
-        first = next(name for name in LOOKING if unpriced.active(name))
+        first = next((name for name in LOOKING if unpriced.active(name)), "emitting surfaces")
         work[first] = work.get(first, 0.0) + around * _RAY_COST + sides * _SIDE_COST
     work[REST] = cells * _CELL_COST
     per_ray = _seconds_per_ray(scene, unit_space(scene), thread_count(settings.threads))

@@ -10,12 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..effects import MOST_PANELS, emitting_triangles
+from ..effects import MOST_PANELS, emitters_by_rays, emitting_triangles
 from ..patches import Space, triangle_geometry
 from ..scene import Float64, Scene, SceneObject
 from ..tessellation import quarters
 from ..textures import MEAN_POINTS, even_points, point_colours, triangle_colours
-from .lamps import Light, Panel
+from .emitter_tree import EmitterTree
+from .illumination import Source
+from .lamps import Panel
 
 #: Panels up to which textured emission is split, and the standard deviation within them, as a share of the light, that
 #: is even enough.
@@ -37,9 +39,24 @@ class Piece:
     uneven: float
 
 
-def emitting_panels(scene: Scene, space: Space) -> list[Light]:
-    """A light for each emitting piece; none when there are so many that rays find them better."""
+def emitting_panels(scene: Scene, space: Space) -> list[Source]:
+    """A light for each emitting piece, or one for all of many; none where rays that look around find them better."""
+    if emitters_by_rays(scene):
+        return []
+    if emitting_triangles(scene) > MOST_PANELS:
+        return [_tree(scene, space)]
     return [Panel(p.name, space.normalise(p.corners), p.radiance, two_sided=True) for p in emitting_pieces(scene)]
+
+
+def _tree(scene: Scene, space: Space) -> EmitterTree:
+    corners, radiance = [], []
+    for scene_object in scene.objects:
+        emission = triangle_colours(scene, scene_object).emission
+        own = space.normalise(scene_object.vertices[scene_object.triangles])
+        emits = (emission.max(axis=1) > 0) & (triangle_geometry(own)[1] > 0)
+        corners.append(own[emits])
+        radiance.append(emission[emits])
+    return EmitterTree(np.concatenate(corners), np.concatenate(radiance))
 
 
 def emitting_pieces(scene: Scene) -> list[Piece]:

@@ -156,6 +156,19 @@ def test_an_emitting_quad_is_an_area_lamp_of_its_radiance(build):
     assert back == pytest.approx(both, rel=1e-6, abs=1e-12)
 
 
+@pytest.mark.parametrize("height", [0.1, 0.01, 0.001])
+def test_an_emitting_quad_close_by_is_not_in_its_own_way(build, height):
+    glowing = build.quad("glowing", (-0.5, -0.5, height), (0, 1, 0), (1, 0, 0), surface=1)
+    scene = Scene((glowing, build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0))), (build.grey, GLOW))
+    space = unit_space(scene)
+    corners = np.concatenate([space.normalise(o.vertices[o.triangles]) for o in scene.objects])
+    up = np.array([[0, 0, 1.0]])
+    point = space.normalise(np.array([[0.1, 0.2, 0]]))
+    panels = emitting_panels(scene, space)
+    seen = DirectLight(panels, Visibility(corners), 0).at(point, up, up, 16, np.random.default_rng(3)).irradiance
+    assert seen[0] == pytest.approx(sum(p.share(point, up)[0] * p.color for p in panels))
+
+
 def test_only_what_emits_becomes_a_panel(build):
     scene = Scene((build.box(surface=[0, 1, 0, 0, 0, 0]), build.quad()), (build.grey, GLOW))
     panels = emitting_panels(scene, unit_space(scene))
