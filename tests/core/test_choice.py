@@ -73,7 +73,7 @@ def test_a_hall_of_lamps_is_exact_where_nothing_is_in_the_way_and_costs_a_few_ra
     every = sum(one.share(point, up)[0] * one.color for one in lights)
     assert light.irradiance == pytest.approx(np.tile(every, (50, 1)), rel=1e-6)
     assert light.variance.max() <= 1e-12 * every.max() ** 2
-    assert light.rays <= 50 * 2 * MOST_ASKED * (2 if sized else 1)
+    assert light.rays["shadow"] <= 50 * 2 * MOST_ASKED * (2 if sized else 1)
 
 
 @pytest.mark.parametrize("sized", [True, False])

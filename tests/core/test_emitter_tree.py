@@ -44,7 +44,7 @@ def test_a_plate_of_many_triangles_is_one_rectangle(point):
     # Shadow rays end a little short of the emitter itself, so nothing is in the way.
     assert (np.abs(light.irradiance.mean(axis=0) - truth) <= 4 * error).all()
     assert light.irradiance[:, 0].std() < 0.5 * truth[0]
-    assert light.rays <= 2 * 4 * TRIES
+    assert light.rays["shadow"] <= 2 * 4 * TRIES
 
 
 def test_each_triangle_shines_in_its_own_colour():
@@ -80,7 +80,7 @@ def test_one_triangle_and_none_facing_the_point():
     assert (np.abs(light.irradiance.mean(axis=0) - truth) <= 4 * error).all()
     dark = seen(tree, triangles, (0, 0, 0), -NORMAL)
     assert dark.irradiance.max() == 0
-    assert dark.rays == 0
+    assert dark.rays["shadow"] == 0
 
 
 def test_many_small_bulbs_become_one_tree_and_a_glowing_room_is_left_to_the_rays(build):
