@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from .adaptation import Adaptation
+from .bending import Bends
 from .check import check_scene
 from .clock import Clock
 from .direct.emitters import emitting_panels
@@ -58,7 +59,9 @@ def bake(
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
             space, around = unit_space(scene), scene.surroundings()
-            receivers = make_receivers(scene, space, settings, effort.triangles)
+            space, around = unit_space(scene), scene.surroundings()
+            start = max(int(effort.triangles / effort.coarsest), 1)
+            receivers = make_receivers(scene, space, settings, start)
             lights = [place(lamp, space) for lamp in (*scene.lamps, *suns)] + emitting_panels(around, space)
             if clock.progress.watched:
                 # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
@@ -73,10 +76,16 @@ def bake(
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
-            limit = len(receivers.cells) + int(effort.growth * effort.triangles)
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
-            receivers = adaptation.refine_receivers(receivers, limit, effort.error)
+            bends = Bends(direct_light, surroundings, effort, settings.seed, workers)
+            if effort.coarsest > 1:
+                limit = max(effort.triangles, 2 * len(receivers.cells))
+                receivers = bends.refine(scene, receivers, 3 * limit // 4)
+            else:
+                limit = len(receivers.cells) + int(effort.growth * effort.triangles)
+            receivers = adaptation.refine_receivers(receivers, limit, effort.error, shadows=effort.coarsest <= 1)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
+        survey.rays.update(bends.rays)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, patches, halves, survey))
         with clock.stage("layers", 0.97):
             return finish(patches, halves, survey, light)

@@ -24,6 +24,8 @@ from .visibility import Visibility
 LOOKING = ("bounces", "sky")
 #: What no single effect costs: points, fit and layers.
 REST = "the rest"
+#: With how many times fewer triangles than asked for the receivers start, to get finer where light calls for it.
+_COARSEST = 16.0
 #: Triangles and patches below which a bake shows next to nothing.
 _FEWEST = 1500
 #: Rays that measure how fast this machine traces this scene.
@@ -40,15 +42,17 @@ _BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
 class Effort:
     """How hard a bake works.
 
-    error: relative, to aim at; triangles: that would cover the receivers, where no size is asked for; growth: how many
-    times as many adaptation may add; patches: wanted number; transport_rays: of a patch side; shadow_rays: to
-    a lamp with size; gather_rays: of a sample point; passes over all cells before the error is first estimated,
-    boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the solve;
-    threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be lamps.
+    error: relative, to aim at; triangles: at most, where no size is asked for; coarsest: with how many times fewer
+    adaptation starts; growth: how many times as many it may add where a size is asked for; patches: wanted number;
+    transport_rays: of a patch side; shadow_rays: to a lamp with size; gather_rays: of a sample point; passes over all
+    cells before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
+    uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
+    triangles are too many to be lamps.
     """
 
     error: float
     triangles: int
+    coarsest: float
     growth: float
     estimator: str
     patches: int
@@ -100,7 +104,8 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     # Too little time for all: fewer triangles and patches, down to where they would show nothing any more.
     share = max(settings.seconds / planned.seconds, 0.02)
     patches = max(int(effort.patches * share), min(effort.patches, _FEWEST))
-    fewer = replace(effort, triangles=max(int(effort.triangles * share), _FEWEST), growth=0.3, patches=patches)
+    triangles = max(int(effort.triangles * share), _FEWEST)
+    fewer = replace(effort, triangles=triangles, coarsest=1.0, growth=0.3, patches=patches)
     return replace(_priced(scene, settings, effects, fewer), seconds=settings.seconds)
 
 
@@ -122,6 +127,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     return Effort(
         error=asked,
         triangles=settings.triangles,
+        coarsest=_COARSEST if settings.tessellate and settings.size is None else 1.0,
         growth=2.0,
         estimator=estimator,
         patches=patches,

@@ -105,7 +105,7 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     shown = np.mean((colours.albedo / np.pi) ** 2, axis=1)
     fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area, shown), len(sampled), 1))
     error, cell_error = estimate_error(
-        fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, _mean_radiance(survey, colours, fits)
+        fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, mean_radiance(survey, colours, fits)
     )
     vertices = {
         "all": receivers.vertices,
@@ -157,7 +157,7 @@ def _light(
     )
 
 
-def _mean_radiance(survey: Survey, colours: Colours, fits: list[Fitted]) -> float:
+def mean_radiance(survey: Survey, colours: Colours, fits: list[Fitted]) -> float:
     """Mean over the receivers and the channels of the radiance, W/(m^2 sr)."""
     receivers = survey.receivers
     cells = receivers.cells

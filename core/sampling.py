@@ -20,6 +20,11 @@ def stream(seed: int, purpose: str, chunk: int = 0) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, chunk]))
 
 
+def subseed(seed: int, purpose: str) -> int:
+    """A seed for a part of the work that draws the same streams as another."""
+    return int(stream(seed, purpose).integers(2**62))
+
+
 def cosine_patterns(count: int, rays: int, rng: np.random.Generator) -> Float32:
     """(count, rays, 3) sets of directions about +z with density cos/pi.
 
