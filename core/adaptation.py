@@ -91,8 +91,9 @@ class Adaptation:
                 split = contact
             if not split.any():
                 break
-            # What is hidden beside a contact must not be coarse either: its dark would reach far, or light reach in.
-            split |= hidden & _touching(receivers, contact)
+            if shadows:
+                # What is hidden beside a contact must not be coarse either: light would reach far into it.
+                split |= hidden & _touching(receivers, contact)
             # A boundary that points have missed in one cell shows in its neighbours, so these are looked at again.
             doubtful = _touching(receivers, split)
             receivers, source = split_cells(receivers, split)

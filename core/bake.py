@@ -79,7 +79,7 @@ def bake(
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
             bends = Bends(direct_light, surroundings, effort, settings.seed, workers)
             if effort.coarsest > 1:
-                limit = max(effort.triangles, 2 * len(receivers.cells))
+                limit = len(receivers.cells) + effort.triangles
                 receivers = bends.refine(scene, receivers, 3 * limit // 4)
             else:
                 limit = len(receivers.cells) + int(effort.growth * effort.triangles)

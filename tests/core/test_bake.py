@@ -95,7 +95,7 @@ def test_the_sun_shines_on_open_ground(build):
 def test_a_lamp_over_the_ground_obeys_the_inverse_square(build):
     """I cos / d^2 at every corner; from ten floors up it bends so little that linear elements show it."""
     lamp = PointLamp("lamp", (0.5, 0.5, 10.0), (10.0, 20.0, 30.0))
-    result = preview(Scene((build.quad(),), (WHITE,), (lamp,)))
+    result = preview(Scene((build.quad(),), (WHITE,), (lamp,)), size=0.1)
     way = np.array(lamp.position) - corners(result.objects[0])
     distance = np.linalg.norm(way, axis=2, keepdims=True)
     expected = 0.5 / np.pi * np.array(lamp.intensity) * way[..., 2:] / distance**3
@@ -111,7 +111,7 @@ def test_a_wall_hides_its_part_of_the_sky(build):
     black = Surface("black", (0.0, 0.0, 0.0))
     wall = build.quad("wall", (0, -60, 0), (0, 120, 0), (0, 0, 1), surface=1, receives=False)
     ground = build.quad("ground", (0, -1, 0), (2, 0, 0), (0, 2, 0))
-    result = preview(Scene((ground, wall), (WHITE, black), sky=(1, 1, 1)), triangles=2000)
+    result = preview(Scene((ground, wall), (WHITE, black), sky=(1, 1, 1)), size=0.09)
     open_sky = result.objects[0].layers["sky"][..., 0].ravel() / 0.5
     distance = corners(result.objects[0])[..., 0].ravel()
     expected = (1 + 1 / np.sqrt(1 + 1 / np.maximum(distance, 1e-9) ** 2)) / 2
