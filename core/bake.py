@@ -77,15 +77,18 @@ def bake(
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
             adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
-            bends = Bends(direct_light, surroundings, effort, settings.seed, workers)
+            rays: dict[str, int] = {}
             if effort.coarsest > 1:
                 limit = len(receivers.cells) + effort.triangles
+                bends = Bends(direct_light, surroundings, effort, settings.seed, workers)
+                # Contacts get the rest.
                 receivers = bends.refine(scene, receivers, 3 * limit // 4)
+                rays = bends.rays
             else:
                 limit = len(receivers.cells) + int(effort.growth * effort.triangles)
             receivers = adaptation.refine_receivers(receivers, limit, effort.error, shadows=effort.coarsest <= 1)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
-        survey.rays.update(bends.rays)
+        survey.rays.update(rays)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, patches, halves, survey))
         with clock.stage("layers", 0.97):
             return finish(patches, halves, survey, light)
