@@ -1,8 +1,8 @@
 """Blender's half: reads the scene, runs the bake, writes the attributes and draws the panel."""
 
-from . import copies, headless, operators, panels, presets, properties, viewport
+from . import copies, headless, operators, panels, presets, properties, translations, viewport
 
-WINDOW = (copies, viewport, properties, operators, presets, panels)
+WINDOW = (translations, copies, viewport, properties, operators, presets, panels)
 
 
 def register() -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import bmesh
 import bpy
+from bpy.app.translations import pgettext_iface as tr
 
 from ..core.lint import Finding
 from ..core.plan import Plan
@@ -20,6 +21,22 @@ WHITEST = 0.9
 _MEMORY_SHARE = 0.8
 #: Of `bmesh.ops`: nearer vertices are one, shorter edges none, in metres.
 _MERGE_DISTANCE = 1e-5
+
+
+#: What is said of each kind of problem.
+SAID = {
+    "mixed winding": "Neighbouring faces look to different sides ({names}): {triangles}",
+    "inside out": "Faces look inward ({names}), and what sees only backs counts as inside and is dark",
+    "duplicate faces": "Faces lie exactly on others ({names}): {triangles}",
+    "zero area": "Faces have no area ({names}): {triangles}",
+    "albedo": "Materials reflect all light or more ({names}), which nothing real does",
+    "coarse": "Faces are larger than lamps are far ({names}), and hide the light between their corners: {triangles}",
+    "shared mesh": "Shares its mesh with others, and each gets different light: {names}",
+    "linked": "Is linked from another file, and cannot be written to: {names}",
+    "modifiers": "Has modifiers that change its faces: {names}",
+    "no light": "Nothing gives off light: no lamp, no emitting material, and a black world",
+    "memory": "Needs about {needed} MB of memory, and {free} MB are free",
+}
 
 
 @dataclass(frozen=True)
@@ -39,9 +56,9 @@ def of_objects(objects: Sequence[bpy.types.Object], result_mode: str, depsgraph:
     linked = [o.name for o in objects if o.library or o.data.library or o.override_library]
     modified = [o.name for o in objects if o.modifiers and o.name not in linked and _changes_faces(o, depsgraph)]
     return [
-        *_about("shared mesh", shared, "shares its mesh with others, and each gets different light"),
-        *_about("linked", linked, "is linked from another file, and cannot be written to"),
-        *_about("modifiers", modified, "has modifiers that change its faces"),
+        *(_problem("shared mesh", (name,)) for name in shared),
+        *(_problem("linked", (name,)) for name in linked),
+        *(_problem("modifiers", (name,)) for name in modified),
     ]
 
 
@@ -51,12 +68,7 @@ def of_findings(found: Iterable[Finding]) -> list[Problem]:
     for finding in found:
         by_kind.setdefault(finding.kind, []).append(finding)
     return [
-        Problem(
-            kind,
-            _SAID[kind](", ".join(f.name for f in group), sum(f.count for f in group)),
-            tuple(f.name for f in group),
-        )
-        for kind, group in by_kind.items()
+        _problem(kind, tuple(f.name for f in group), sum(f.count for f in group)) for kind, group in by_kind.items()
     ]
 
 
@@ -65,7 +77,8 @@ def of_plan(planned: Plan) -> list[Problem]:
     free = free_memory_mb()
     if free is None or planned.memory_mb <= _MEMORY_SHARE * free:
         return []
-    return [Problem("memory", f"Needs about {planned.memory_mb:,.0f} MB of memory, and {free:,.0f} MB are free")]
+    text = tr(SAID["memory"]).format(needed=f"{planned.memory_mb:,.0f}", free=f"{free:,.0f}")
+    return [Problem("memory", text)]
 
 
 def free_memory_mb() -> float | None:
@@ -77,7 +90,7 @@ def free_memory_mb() -> float | None:
 
 
 def no_light() -> Problem:
-    return Problem("no light", "Nothing gives off light: no lamp, no emitting material, and a black world")
+    return _problem("no light", ())
 
 
 def fix(context: bpy.types.Context, problem: Problem) -> None:
@@ -86,8 +99,9 @@ def fix(context: bpy.types.Context, problem: Problem) -> None:
     FIXES[problem.kind][1](context, objects, problem)
 
 
-def _about(kind: str, names: list[str], what: str) -> list[Problem]:
-    return [Problem(kind, f"'{name}' {what}", (name,)) for name in names]
+def _problem(kind: str, names: tuple[str, ...], count: int = 0) -> Problem:
+    triangles = wording.count("triangle", count)
+    return Problem(kind, tr(SAID[kind]).format(names=", ".join(names), triangles=triangles), names)
 
 
 def _changes_faces(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:
@@ -97,23 +111,6 @@ def _changes_faces(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> boo
         except ValueError:
             return True
     return False
-
-
-_SAID: dict[str, Callable[[str, int], str]] = {
-    "mixed winding": lambda names, n: (
-        f"Neighbouring faces look to different sides ({names}): {wording.count('triangle', n)}"
-    ),
-    "inside out": lambda names, _: (
-        f"Faces look inward ({names}), and what sees only backs counts as inside and is dark"
-    ),
-    "duplicate faces": lambda names, n: f"Faces lie exactly on others ({names}): {wording.count('triangle', n)}",
-    "zero area": lambda names, n: f"Faces have no area ({names}): {wording.count('triangle', n)}",
-    "albedo": lambda names, _: f"Materials reflect all light or more ({names}), which nothing real does",
-    "coarse": lambda names, n: (
-        f"Faces are larger than lamps are far ({names}): {wording.count('triangle', n)} that cannot "
-        "show the light between their corners"
-    ),
-}
 
 
 def _edit(obj: bpy.types.Object, change: Callable[[bmesh.types.BMesh], object]) -> None:

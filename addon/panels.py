@@ -8,6 +8,7 @@ import textwrap
 from typing import ClassVar
 
 import bpy
+from bpy.app.translations import pgettext_iface as tr
 
 from . import presets, viewport
 from .checklist import FIXES
@@ -126,7 +127,6 @@ class LastBakeSection:
 
 class PlanSection:
     bl_label = "Check and Plan"
-    bl_options: ClassVar[set[str]] = {"DEFAULT_CLOSED"}
 
     def draw(self, context: bpy.types.Context) -> None:
         settings, layout = context.scene.radiosity_baker, self.layout
@@ -140,8 +140,8 @@ class PlanSection:
             layout.label(text="Nothing stands in the way", icon="CHECKMARK")
         if "seconds" in plan:
             column = layout.column(align=True)
-            _figure(column, "Time", f"About {plan['seconds']:.1f} s")
-            _figure(column, "Memory", f"About {plan['memory_mb']:,.0f} MB")
+            _figure(column, "Time", tr("About {amount}").format(amount=f"{plan['seconds']:.1f} s"))
+            _figure(column, "Memory", tr("About {amount}").format(amount=f"{plan['memory_mb']:,.0f} MB"))
         if plan.get("costs"):
             row = layout.row(align=True)
             for error, seconds in plan["costs"]:
@@ -192,8 +192,8 @@ def redraw(context: bpy.types.Context) -> None:
 def _what_is_baked(context: bpy.types.Context) -> str:
     selected = sum(candidate.type == "MESH" for candidate in context.selected_objects)
     if selected == 0:
-        return "Bakes all mesh objects"
-    return f"Bakes {count('selected object', selected)}"
+        return tr("Bakes all mesh objects")
+    return tr("Bakes {objects}").format(objects=count("selected object", selected))
 
 
 def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:

@@ -5,6 +5,8 @@ A report is what `core.result.Report.as_dict` gives.
 
 from typing import Any
 
+from bpy.app.translations import pgettext_iface as tr
+
 from .job import BakeJob
 
 
@@ -43,32 +45,36 @@ def energy_line(report: dict[str, Any]) -> str:
         return ""
     emitted, absorbed, escaped = (watts(energy[name]) for name in ("emitted", "absorbed", "escaped"))
     lost = abs(energy["residual"]) / energy["emitted"]
-    unaccounted = percent(lost) if lost >= 0.0005 else "less than 0.1 %"
-    return f"Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {unaccounted} is not accounted for"
+    unaccounted = percent(lost) if lost >= 0.0005 else tr("less than 0.1 %")
+    return tr(
+        "Of {emitted} given off, {absorbed} were absorbed and {escaped} escaped; {unaccounted} is not accounted for"
+    ).format(emitted=emitted, absorbed=absorbed, escaped=escaped, unaccounted=unaccounted)
 
 
 def stage(job: BakeJob) -> str:
     """Where a running bake is, short enough for a bar in a narrow panel."""
     if job.cancelling:
-        return "Cancelling"
+        return tr("Cancelling")
     if job.writing:
-        return "Writing"
+        return tr("Writing")
     if job.keeping:
-        return "Keeping"
+        return tr("Keeping")
     if job.poll():
-        return "Waiting for Object Mode"
+        return tr("Waiting for Object Mode")
     progress = job.progress
-    done = f"{progress.stage.capitalize() or 'Starting'} {100.0 * progress.fraction:.0f} %"
-    return done if progress.error is None else f"{done}, error {percent(progress.error)}"
+    done = f"{tr(progress.stage.capitalize() or 'Starting')} {100.0 * progress.fraction:.0f} %"
+    return done if progress.error is None else f"{done}, {tr('error')} {percent(progress.error)}"
 
 
 def time_line(job: BakeJob) -> str:
-    so_far = f"{clock(job.elapsed)} so far"
-    return so_far if job.remaining is None else f"{so_far}, about {clock(job.remaining)} left"
+    so_far = tr("{time} so far").format(time=clock(job.elapsed))
+    if job.remaining is None:
+        return so_far
+    return f"{so_far}, " + tr("about {time} left").format(time=clock(job.remaining))
 
 
 def count(noun: str, number: int) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number:,} {noun}s"
+    return f"{number:,} {tr(noun if number == 1 else f'{noun}s')}"
 
 
 def percent(share: float) -> str:

@@ -283,6 +283,90 @@ def switch_layers():
     assert view_area().spaces.active.shading.color_type == "MATERIAL"
 
 
+def keep_what_there_is():
+    """Stop at the first light: it is written, and says what it is."""
+    open_sample()
+    yield 1.0
+    yield from open_tab()
+    before = content()
+    settings().triangles = 20_000
+    yield from bake_by_click()
+    yield from first_light()
+    x, y = cancel_button()
+    yield from click(x - 22 * bpy.context.preferences.system.ui_scale, y)
+    yield from until(lambda: not running(), 30, "the end of the bake that was to be kept")
+    yield 0.5
+    yield from picture("kept")
+    assert content() != before
+    assert "stopped early" in " ".join(settings().last_report()["warnings"])
+
+
+def relight():
+    """Move and weaken the lamp, bake again, and see it."""
+    ask_for_a_moment()
+    lamp = next(o for o in bpy.context.scene.objects if o.type == "LIGHT")
+    lamp.data.energy *= 0.3
+    lamp.location.x -= 0.2 * lamp.dimensions.x + 0.1
+    names = [name for name, *_ in content()]
+    yield from bake_by_click()
+    yield from until(lambda: not running(), 120, "the end of the second bake")
+    yield 0.5
+    yield from picture("relit")
+    assert [name for name, *_ in content()] == names
+    assert brightness["relit"] < brightness["kept"] - 0.02, "less light does not show"
+
+
+def clear_it():
+    bpy.ops.object.radiosity_clear()
+    yield 0.5
+    yield from picture("cleared")
+    assert not [name for name, *_ in content() if "Radiosity" in name]
+    assert not any(hidden for *_, hidden in content())
+    assert "Radiosity Bake" not in bpy.data.collections
+
+
+def check_the_scene():
+    """Turn one face over, see it named, and mend it."""
+    block = next(o for o in bpy.context.scene.objects if o.name == "Short block")
+    block.data.polygons[0].flip()
+    bpy.ops.object.radiosity_plan()
+    yield 0.5
+    yield from picture("check")
+    assert [problem.kind for problem in settings().problems()] == ["mixed winding"]
+    bpy.ops.object.radiosity_fix(number=0)
+    yield 0.5
+    yield from picture("checked")
+    assert settings().problems() == []
+
+
+def be_a_new_user():
+    """The default scene, a plane and a lamp, and one press."""
+    bpy.ops.wm.read_homefile(load_ui=False, use_factory_startup=True)
+    yield 1.0
+    yield from open_tab()
+    with bpy.context.temp_override(area=view_area(), region=view_area().regions[-1]):
+        bpy.ops.mesh.primitive_plane_add(size=8, location=(0, 0, -1))
+        bpy.ops.object.light_add(type="POINT", location=(2, -2, 2))
+    bpy.ops.object.select_all(action="DESELECT")
+    ask_for_a_moment()
+    yield from bake_by_click()
+    yield from until(lambda: not running(), 120, "the end of the first bake of a new user")
+    yield 0.5
+    yield from picture("new_user")
+
+
+def speak_german():
+    if "de_DE" not in bpy.app.translations.locales:
+        print("SKIPPED: German, which this Blender was built without", flush=True)
+        return
+    view = bpy.context.preferences.view
+    view.language, view.use_translate_interface, view.use_translate_tooltips = "de_DE", True, True
+    yield 1.0
+    yield from picture("german")
+    view.language = "en_US"
+    yield 0.5
+
+
 def search_for_it():
     yield from press("F3")
     yield 0.5
@@ -340,7 +424,7 @@ def delete_meanwhile():
     before = content()
     ask_for_a_moment()
     yield from bake_by_click()
-    doomed = next(o for o in bpy.context.scene.objects if o.type == "MESH" and not o.hide_render)
+    doomed = next(o for o in bpy.context.scene.objects if o.type == "MESH" and o.hide_render)  # the original of a copy
     bpy.data.objects.remove(doomed)
     yield from until(lambda: not running(), 120, "the end of the bake")
     yield 0.5
@@ -371,6 +455,12 @@ def day():
     yield from switch_layers()
     yield from search_for_it()
     yield from see_the_render_properties()
+    yield from keep_what_there_is()
+    yield from relight()
+    yield from clear_it()
+    yield from check_the_scene()
+    yield from be_a_new_user()
+    yield from speak_german()
     yield from load_a_file_meanwhile()
     yield from edit_meanwhile()
     yield from delete_meanwhile()
