@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from .scene import ALBEDO_LIMIT, Float32, Float64, Int32, Scene, SceneError, SceneObject, Surface, Texture
 
-#: Points of a triangle whose mean stands for it: the centroids of the parts that halving its edges twice gives.
-MEAN_POINTS = 16
+#: Look-ups that the means of some triangles are worth, and how many points each triangle gets at least and at most.
+_LOOK_UPS, _FEWEST_POINTS, MOST_POINTS = 200_000, 16, 256
 #: Look-ups at a time: few enough to stay in the processor's caches.
 _CHUNK = 32768
 
@@ -44,11 +44,17 @@ def even_points(count: int) -> Float64:
 
 
 def mean_colours(
-    scene: Scene, scene_object: SceneObject, parent: Int32, barycentric: Float64, points: int = MEAN_POINTS
+    scene: Scene, scene_object: SceneObject, parent: Int32, barycentric: Float64, points: int | None = None
 ) -> Colours:
-    """Mean colours of m triangles: parts (m, 3, 3), by the corners' weights, of the object's triangles parent (m,)."""
+    """Mean colours of m triangles: parts (m, 3, 3), by the corners' weights, of the object's triangles parent (m,).
+
+    points: of each, a square number; by default the more the fewer triangles there are.
+    """
     if not varies(scene, scene_object):
         return constant_colours(scene, scene_object.surface[parent])
+    if points is None:
+        points = int((_LOOK_UPS / max(len(parent), 1)) ** 0.5) ** 2
+        points = min(max(points, _FEWEST_POINTS), MOST_POINTS)
     every = even_points(points)
     parts = [point_colours(scene, scene_object, parent, barycentric, point, 1.0 / points) for point in every]
     return Colours(*(np.mean([getattr(part, name) for part in parts], axis=0) for name in ("albedo", "emission")))

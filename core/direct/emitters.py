@@ -14,7 +14,7 @@ from ..effects import MOST_PANELS, emitters_by_rays, emitting_triangles
 from ..patches import Space, triangle_geometry
 from ..scene import Float64, Scene, SceneObject
 from ..tessellation import quarters
-from ..textures import MEAN_POINTS, even_points, point_colours, triangle_colours
+from ..textures import MOST_POINTS, even_points, point_colours, triangle_colours
 from .emitter_tree import EmitterTree
 from .illumination import Source
 from .lamps import Panel
@@ -86,8 +86,8 @@ def _piece(scene: Scene, scene_object: SceneObject, triangle: int, weights: Floa
     if surface.emission_texture is None:
         radiance = np.array([surface.emitted])
     else:
-        every = even_points(MEAN_POINTS)
-        parts = [point_colours(scene, scene_object, parent, weights[None], p, 1.0 / MEAN_POINTS) for p in every]
+        every = even_points(MOST_POINTS)
+        parts = [point_colours(scene, scene_object, parent, weights[None], p, 1.0 / MOST_POINTS) for p in every]
         radiance = np.concatenate([part.emission for part in parts])
     return Piece(
         surface.name,
