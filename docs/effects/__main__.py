@@ -1,4 +1,4 @@
-"""Measures the scenes, all or those named, a line for each, and renews docs/effects.md when all were measured."""
+"""Measures the scenes, all or those named, and renews their rows in docs/effects.md."""
 
 from __future__ import annotations
 
@@ -6,26 +6,27 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
-from .catalogue import all_scenes
+from .catalogue import EffectScene, all_scenes
 from .measure import FULL, Measured, measure
 
 DOCS = Path(__file__).resolve().parents[1]
 CACHE = DOCS.parent / "build" / "effects"
-_HEAD = "| Scene | Simulated | Typical error | Noise of reference | Bias | Processor seconds | Million rays | |\n"
-_RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |\n"
+_HEAD = "| Scene | Simulated | Typical error | Noise of reference | Bias | Processor seconds | Million rays | |"
+_RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
 
 
-def table(measured: Sequence[Measured]) -> str:
-    """A row for each scene, kind by kind."""
-    text, kind = "", ""
-    for one in measured:
-        if one.scene.kind != kind:
-            kind = one.scene.kind
-            text += f"\n## {kind.replace('_', ' ').capitalize()}\n\n{_HEAD}{_RULE}"
-        text += f"| {' | '.join(_cells(one))} |\n"
-    return text
+def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measured]) -> str:
+    """The document with the rows of the measured scenes renewed, kind by kind; the words before the tables stay."""
+    rows = {line.split(" | ")[0].removeprefix("| "): line for line in text.splitlines() if line.startswith("| ")}
+    rows |= {one.scene.name: f"| {' | '.join(_cells(one))} |" for one in measured}
+    rows = {name: rows[name] for name in scenes if name in rows}
+    good = sum(row.endswith("| good |") for row in rows.values())
+    words = text.partition("\n## ")[0].partition("\n**Result.**")[0].rstrip()
+    parts = [words, f"**Result.** {good} of {len(rows)} scenes are good."]
+    for kind in dict.fromkeys(scenes[name].kind for name in rows):
+        own = [row for name, row in rows.items() if scenes[name].kind == kind]
+        parts.append("\n".join([f"## {kind.replace('_', ' ').capitalize()}\n", _HEAD, _RULE, *own]))
+    return "\n\n".join(parts) + "\n"
 
 
 def _cells(one: Measured) -> list[str]:
@@ -49,29 +50,14 @@ def main() -> None:
     options = parser.parse_args()
     scenes = all_scenes()
     chosen = [s for s in scenes.values() if not options.names or {s.name, s.kind} & set(options.names)]
-    measured = []
     for scene in chosen:
         if options.list:
             print(f"{scene.kind}: {scene.name}")
             continue
-        measured.append(measure(scene, FULL, CACHE))
-        print(" | ".join(_cells(measured[-1])), flush=True)
-    if measured and len(chosen) == len(scenes):
-        _write(measured)
-
-
-def _write(measured: Sequence[Measured]) -> None:
-    """Put the table where the document has it; what people wrote before it stays."""
-    document = DOCS / "effects.md"
-    words = document.read_text(encoding="utf-8").partition("\n## ")[0].rstrip()
-    good = sum(not one.complaints() for one in measured)
-    summary = f"{good} of {len(measured)} scenes are good; the median typical error is {_median(measured):.1%}."
-    words = words.partition("\n**Result.**")[0].rstrip()
-    document.write_text(f"{words}\n\n**Result.** {summary}\n{table(measured)}", encoding="utf-8")
-
-
-def _median(measured: Sequence[Measured]) -> float:
-    return float(np.median([one.typical for one in measured]))
+        measured = measure(scene, FULL, CACHE)
+        print(" | ".join(_cells(measured)), flush=True)
+        report = DOCS / "effects.md"
+        report.write_text(document(report.read_text(encoding="utf-8"), scenes, [measured]), encoding="utf-8")
 
 
 if __name__ == "__main__":

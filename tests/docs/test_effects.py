@@ -6,6 +6,7 @@ import bpy
 import pytest
 
 from radiosity_baker.core.effects import EFFECTS
+from radiosity_baker.docs.effects.__main__ import document
 from radiosity_baker.docs.effects.catalogue import all_scenes, built
 from radiosity_baker.docs.effects.measure import QUICK, measure
 
@@ -44,3 +45,15 @@ def test_every_scene_starts_from_nothing():
     for _ in range(2):
         built(SCENES["square area lamp"])
         assert len(bpy.context.scene.objects) == 4
+
+
+def test_the_document_keeps_its_words_and_the_rows_that_were_not_measured(tmp_path):
+    measured = measure(SCENES["square area lamp"], QUICK, tmp_path)
+    rows = "| sun of five degrees | was | good |\n| gone | x | good |\n"
+    before = f"# Title\n\nWords.\n\n**Result.** old\n\n## Lamps\n\n{rows}"
+    text = document(before, SCENES, [measured])
+    assert text.startswith("# Title\n\nWords.\n\n**Result.** ")
+    assert "| sun of five degrees | was | good |" in text
+    assert "| square area lamp | area lamps" in text
+    assert "gone" not in text
+    assert document(text, SCENES, [measured]) == text
