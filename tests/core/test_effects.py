@@ -25,6 +25,7 @@ from radiosity_baker.core.settings import Settings
 
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 COLOR = (1.0, 1.0, 1.0)
+LAMP = PointLamp("bulb", (0.2, 0.1, 1), COLOR)
 QUICK = Settings(triangles=60, error=0.08, threads=1)
 
 
@@ -165,3 +166,16 @@ def test_lamps_that_cast_no_shadow_shine_through(build):
     through = light(Scene((floor, roof), (black,), (replace(lamp, casts_shadow=False),)))[..., 0]
     assert dark.max() < 0.01 * through.max()
     assert through.min() > 0
+
+
+def test_forcing_an_effect_on_that_is_not_there_changes_nothing(build):
+    """Neither the light nor, where no ray can tell anything, the rays; whichever effect it is."""
+    bare = Scene((build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0)),), (build.grey,), (LAMP,))
+    plain = bake(bare, QUICK)
+    absent = [effect.name for effect in plain.report.effects if not effect.active]
+    assert len(absent) > 8
+    forced = bake(bare, replace(QUICK, effects=dict.fromkeys(absent, True)))
+    shown, same = (r.objects[0].layers["combined"] for r in (plain, forced))
+    assert shown == pytest.approx(same, rel=1e-5)
+    more = {purpose for purpose, count in forced.report.rays.items() if count > plain.report.rays.get(purpose, 0)}
+    assert more <= {"shadow", "total"}

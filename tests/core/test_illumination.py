@@ -119,9 +119,12 @@ def test_no_light_comes_from_below_the_surface_itself(build):
 
 
 def test_lamps_add_up(build):
-    alone = [behind(build, [lamp], tries=1).irradiance[0] for lamp in (PANEL, BALL, SUN, POINT)]
-    together = behind(build, [PANEL, BALL, SUN, POINT], tries=1).irradiance[0]
-    assert together == pytest.approx(np.sum(alone, axis=0))
+    """Their light, and exactly their rays: no kind of lamp makes another one dearer."""
+    lamps = (PANEL, BALL, SUN, POINT)
+    alone = [behind(build, [lamp], tries=1) for lamp in lamps]
+    together = behind(build, lamps, tries=1)
+    assert together.irradiance[0] == pytest.approx(np.sum([one.irradiance[0] for one in alone], axis=0))
+    assert together.rays["shadow"] == sum(one.rays["shadow"] for one in alone)
 
 
 def test_a_point_lamp_takes_one_ray_and_darkness_none(build):
