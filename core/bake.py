@@ -59,7 +59,6 @@ def bake(
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
             space, around = unit_space(scene), scene.surroundings()
-            space, around = unit_space(scene), scene.surroundings()
             start = max(int(effort.triangles / effort.coarsest), 1)
             receivers = make_receivers(scene, space, settings, start)
             lights = [place(lamp, space) for lamp in (*scene.lamps, *suns)] + emitting_panels(around, space)

@@ -26,8 +26,9 @@ from .sky import Sky
 from .transport import Transport
 from .visibility import Visibility
 
-#: A point that gets less than this share of the mean light is dark.
-_DARK = 0.05
+#: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
+#: cell's size, one that gets less than half.
+_DARK, _DIM, _GAP = 0.05, 0.5, 0.25
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,20 +90,17 @@ def _table(half: Transport, sky: Sky, emitters: bool) -> Float32:
 
 
 def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
-    """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or where something
-    lies on the surface, or over it by less than the size of a cell.
+    """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or in a gap that is
+    much narrower than their cell, under what lies on the surface or nearly so.
 
     A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
     reaches count. indirect, direct (n,): mean irradiance.
     """
     total = indirect + direct
-    dark = (total <= _DARK * total.mean()) & (direct <= 0)
-    hidden = dark & enclosed
-    open_ahead = np.flatnonzero(dark & ~enclosed)
-    if len(open_ahead):
-        hidden[open_ahead] = hemispheres.covered(
-            points.positions[open_ahead], points.normals[open_ahead], points.size[open_ahead]
-        )
+    hidden = enclosed & (total <= _DARK * total.mean()) & (direct <= 0)
+    dim = np.flatnonzero(~hidden & (total <= _DIM * total.mean()) & (direct <= 0))
+    if len(dim):
+        hidden[dim] = hemispheres.covered(points.positions[dim], points.normals[dim], _GAP * points.size[dim])
     return np.asarray(hidden)
 
 
