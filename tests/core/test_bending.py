@@ -1,0 +1,78 @@
+"""Receivers start coarse and get finer where light bends, without cracks and without moving a point."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.patches import triangle_geometry
+from radiosity_baker.core.plan import choose_effort
+from radiosity_baker.core.receivers import shared_edges
+from radiosity_baker.core.result import BakedObject
+from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
+from radiosity_baker.core.settings import Settings
+
+
+@pytest.fixture(scope="module")
+def shaded(build):
+    """A square's hard shadow on the ground."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    sail = build.quad("sail", (-0.7, -0.7, 1), (1.4, 0, 0), (0, 1.4, 0), receives=False)
+    sun = SunLamp("sun", (0, 0, -1), (1.0, 1.0, 1.0))
+    settings = Settings(triangles=6000, error=0.02, threads=2)
+    return Scene((ground, sail), (build.grey,), (sun,)), settings
+
+
+def centres_and_areas(baked: BakedObject) -> tuple[np.ndarray, np.ndarray]:
+    corners = baked.vertices[baked.triangles]
+    return corners.mean(axis=1), triangle_geometry(corners)[1]
+
+
+def test_triangles_are_small_along_a_shadow_edge_and_large_elsewhere(shaded):
+    result = bake(*shaded).objects[0]
+    centre, area = centres_and_areas(result)
+    edge = np.abs(np.abs(centre[:, :2]).max(axis=1) - 0.7)
+    assert np.median(area[edge < 0.03]) < np.median(area[edge > 0.5]) / 15
+    assert len(area) <= 6000 + 6000 / 16 * 2
+
+
+def test_it_fits_better_than_as_many_triangles_of_one_size(shaded):
+    """Against the shadow itself, at random points of every triangle; even triangles may be half as many or twice."""
+    scene, settings = shaded
+    adapted = bake(scene, settings).objects[0]
+    wanted = Settings(triangles=len(adapted.triangles), threads=2)
+    even = bake(scene, wanted, effort=replace(choose_effort(scene, wanted), coarsest=1.0, growth=0.0)).objects[0]
+    assert len(even.triangles) > len(adapted.triangles) / 2
+    assert squared_error(adapted) < squared_error(even) / 2
+
+
+def squared_error(baked: BakedObject) -> float:
+    weights = np.random.default_rng(0).dirichlet(np.ones(3), size=(len(baked.triangles), 20))
+    points = np.einsum("tbi,tik->tbk", weights, baked.vertices[baked.triangles])
+    true = np.where(np.abs(points[..., :2]).max(axis=2) < 0.7, 0.0, 0.5 / np.pi)
+    shown = np.einsum("tbi,ti->tb", weights, baked.layers["combined"][..., 0])
+    return float(centres_and_areas(baked)[1] @ ((shown - true) ** 2).mean(axis=1))
+
+
+def test_no_cracks_and_no_point_moved(shaded):
+    """Every inner edge has two triangles, and new points lie where their weights say, on the input's triangles."""
+    scene, settings = shaded
+    result = bake(scene, settings).objects[0]
+    ground = scene.objects[0]
+    assert result.vertices[: len(ground.vertices)].tobytes() == ground.vertices.tobytes()
+    corners = result.vertices[result.triangles]
+    told = result.barycentric @ ground.vertices[ground.triangles][result.parent]
+    assert told == pytest.approx(corners, abs=1e-12)
+    edges = 3 * len(result.triangles)
+    on_rim = np.abs(corners[:, :, :2]) == 2.0
+    rim = np.count_nonzero((on_rim & np.roll(on_rim, -1, axis=1)).any(axis=2))
+    assert 2 * len(shared_edges(result.triangles)[0]) + rim == edges
+
+
+def test_even_light_needs_no_more_triangles_than_at_the_start(build):
+    lamp = PointLamp("lamp", (0.5, 0.5, 30.0), (100.0, 100.0, 100.0))
+    result = bake(Scene((build.quad(),), (build.grey,), (lamp,)), Settings(triangles=5000, error=0.02, threads=2))
+    assert len(result.objects[0].triangles) < 5000 / 8
