@@ -44,6 +44,10 @@ class ErrorEstimate:
     def total(self) -> float:
         return float(np.sqrt(self.sampling**2 + self.transport**2 + self.resolution**2))
 
+    def scaled(self, factor: float) -> ErrorEstimate:
+        """The same causes, relative to another light."""
+        return ErrorEstimate(factor * self.sampling, factor * self.transport, factor * self.resolution)
+
     def as_dict(self) -> dict[str, float]:
         """By name, with their total; empty where nothing is known."""
         if not np.isfinite(self.total):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from .adaptation import Adaptation
+from .baked import Baked
 from .bending import Bends
 from .check import check_scene
 from .clock import Clock
@@ -12,33 +13,41 @@ from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .direct.sky import split_bright
-from .layers import baked_objects
+from .memory import Memory
 from .parallel import Workers
 from .patch_refinement import patches_by_light
-from .patches import Patches, make_patches, split_objects, unit_space
+from .patches import make_patches, split_objects, unit_space
 from .plan import Effort, plan
 from .progress import Progress
 from .receivers import make_receivers
 from .refinement import Light, average_light, refine
-from .report import make_report
 from .result import BakeResult
 from .scene import Scene, SkyMap
 from .settings import Settings
 from .sky import Sky
 from .survey import Survey, look_up
-from .transport import Transport, solve_halves
+from .transport import solve_halves
 from .visibility import Visibility
 
 
 def bake(
-    scene: Scene, settings: Settings, progress: Progress | None = None, effort: Effort | None = None
+    scene: Scene,
+    settings: Settings,
+    progress: Progress | None = None,
+    effort: Effort | None = None,
+    memory: Memory | None = None,
 ) -> BakeResult:
     """Bake the light of a scene onto its receivers.
 
-    effort: to work just so hard, instead of as hard as the settings call for.
+    effort: to work just so hard, instead of as hard as the settings call for. memory: of the last bake, to go on from
+    where it can.
     Raises SceneError for a scene that cannot be baked, Cancelled when progress says so.
     """
     clock = Clock(progress or Progress())
+    recalled = memory.recall(scene, settings, clock) if memory else None
+    if recalled is not None:
+        return recalled
+    given = scene
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
     scene = planned.scene
@@ -48,13 +57,8 @@ def bake(
     sky = Sky.of(smooth)
     clock.progress.expected = planned.seconds
 
-    def finish(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> BakeResult:
-        objects = tuple(baked_objects(scene, survey.receivers, light, settings.layers))
-        report = make_report(scene, settings, planned, clock, workers.threads, patches, halves, survey, light, objects)
-        return BakeResult(objects, report)
-
-    def show(patches: Patches, halves: tuple[Transport, ...], survey: Survey, light: Light) -> None:
-        clock.progress.show(lambda: finish(patches, halves, survey, light))
+    def show(baked: Baked, light: Light) -> None:
+        clock.progress.show(lambda: baked.result(light, settings, clock))
 
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("tessellate", 0.03):
@@ -68,7 +72,7 @@ def bake(
                 straight = DirectLight(lights, Visibility(coarse.corners, coarse.optics), settings.seed)
                 first = Survey(receivers, straight, None, effort, settings.seed, workers)
                 first.run_pass()
-                show(coarse, (), first, average_light(first))
+                show(Baked(planned, coarse, (), first), average_light(first))
             patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1, until=0.28):
@@ -88,6 +92,9 @@ def bake(
             receivers = adaptation.refine_receivers(receivers, limit, effort.error, shadows=effort.coarsest <= 1)
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
         survey.rays.update(rays)
-        light = refine(survey, scene, settings, effort, workers, clock, partial(show, patches, halves, survey))
-        with clock.stage("layers", 0.97):
-            return finish(patches, halves, survey, light)
+        baked = Baked(planned, patches, halves, survey)
+        light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))
+    if memory:
+        memory.remember(given, settings, baked, light)
+    with clock.stage("layers", 0.97):
+        return baked.result(light, settings, clock)

@@ -29,7 +29,8 @@ _MOST_ROUNDS, _MOST_PASSES = 3, 128
 class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
-    reflected, sky, emitted, lamps (v, 3); error; cell_error (c,) mean square of each cell's radiance error; vertices:
+    reflected, sky, emitted, lamps (v, 3); alphas: the smoothing of direct and, if any, indirect light; error;
+    cell_error (c,) mean square of each cell's radiance error; vertices:
     how many there are, how many no valid sample tells of and were filled from their neighbours, and how many lie so
     deep inside solids that they stay dark.
     """
@@ -38,6 +39,7 @@ class Light:
     sky: Float64
     emitted: Float64
     lamps: Float64
+    alphas: tuple[float, ...]
     error: ErrorEstimate
     cell_error: Float64
     vertices: dict[str, int]
@@ -112,7 +114,18 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
         "filled": int(np.count_nonzero(fit.filled)),
         "hidden": int(np.count_nonzero(fit.hidden & ~fit.filled)),
     }
-    return _light(survey, [f.values for f in fits], error, cell_error, vertices)
+    return _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), error, cell_error, vertices)
+
+
+def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
+    """The light with a smoothing that is given, and with nothing known of its error."""
+    fit = Fit(survey.receivers, survey.valid_samples, survey.invalid)
+    values = []
+    for halves, alpha in zip((survey.direct, survey.indirect), alphas, strict=False):
+        both = halves[0] + halves[1]
+        values.append(fit.solve_within(fit.system(both), alpha, both))
+    dark = np.zeros(len(survey.receivers.cells))
+    return _light(survey, values, alphas, UNKNOWN, dark, {"all": survey.receivers.vertices})
 
 
 def average_light(survey: Survey) -> Light:
@@ -132,11 +145,16 @@ def average_light(survey: Survey) -> Light:
         return np.stack(channels, axis=1)
 
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-    return _light(survey, [mean(halves) for halves in sampled], UNKNOWN, np.zeros(len(cells)), {"all": count})
+    return _light(survey, [mean(halves) for halves in sampled], (), UNKNOWN, np.zeros(len(cells)), {"all": count})
 
 
 def _light(
-    survey: Survey, values: list[Float64], error: ErrorEstimate, cell_error: Float64, vertices: dict[str, int]
+    survey: Survey,
+    values: list[Float64],
+    alphas: tuple[float, ...],
+    error: ErrorEstimate,
+    cell_error: Float64,
+    vertices: dict[str, int],
 ) -> Light:
     """Vertex values (v, channels) of direct and, if any, indirect light, by where it came from."""
     around = survey.surroundings
@@ -151,6 +169,7 @@ def _light(
         sky=sky,
         emitted=emitted,
         lamps=values[0][:, :3],
+        alphas=alphas,
         error=error,
         cell_error=cell_error,
         vertices=vertices,

@@ -11,18 +11,15 @@ from .patches import Patches
 from .plan import Plan
 from .refinement import Light
 from .result import BakedObject, Report
-from .scene import Scene
 from .settings import Settings
 from .survey import Survey
 from .transport import Transport
 
 
 def make_report(
-    scene: Scene,
     settings: Settings,
     plan: Plan,
     clock: Clock,
-    threads: int,
     patches: Patches,
     halves: tuple[Transport, ...],
     survey: Survey,
@@ -36,7 +33,7 @@ def make_report(
         patches=len(patches),
         rays={"total": sum(rays.values()), **rays},
         iterations=max((h.solution.iterations for h in halves), default=0),
-        threads=threads,
+        threads=survey.workers.threads,
         estimated_error=light.error.as_dict(),
         energy=_mean_energy(halves),
         effects=list(plan.effects),
@@ -46,7 +43,7 @@ def make_report(
         ],
         vertices=light.vertices,
         peak_memory_mb=peak_memory_mb(),
-        warnings=[*scene.warnings, *_warnings(settings, light)],
+        warnings=[*plan.scene.warnings, *_warnings(settings, light)],
     )
 
 

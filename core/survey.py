@@ -132,8 +132,8 @@ class Survey:
         self.rays: Counter[str] = Counter()
         self._light = direct_light
         self._effort = effort
-        self._seed = seed
-        self._workers = workers
+        self.seed = seed
+        self.workers = workers
         self._shift = stream(seed, "cells").random((count, 2))
         self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
@@ -162,7 +162,7 @@ class Survey:
         half, columns = number % 2, len(around.to_grey)
         table = around.tables[half] if number < 2 else around.tables[half][:, :columns]
         arriving, deviation, enclosed, rays = gather_indirect(
-            points, around.hemispheres, table, self._seed, number, self._workers
+            points, around.hemispheres, table, self.seed, number, self.workers
         )
         self.rays += rays
         values = arriving[:, :columns]
@@ -205,8 +205,13 @@ class Survey:
         fair = (self._effort.error * float(cells.area @ mean)) ** 2 / float(cells.area.sum()) / len(cells)
         return boundary & (around[corner].max(axis=1) * cells.area > fair)
 
+    @property
+    def visibility(self) -> Visibility:
+        """What stands between the receivers and the light."""
+        return self._light.visibility
+
     def _direct(self, points: Points, number: int) -> Illumination:
-        light = gather_direct(points, self._light, self._effort.shadow_rays, self._seed, number, self._workers)
+        light = gather_direct(points, self._light, self._effort.shadow_rays, self.seed, number, self.workers)
         self.rays += light.rays
         return light
 

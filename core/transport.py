@@ -21,25 +21,53 @@ from .sky import Sky
 from .solver import Solution, contraction, shoot_until, solve, solve_both_sides
 from .visibility import Visibility
 
+#: The two independent solutions, by the names of their streams of random numbers.
+HALVES = "first half", "second half"
 _CHUNK = 1024
+
+
+@dataclass(frozen=True, eq=False)
+class Exchange:
+    """Light between sides: exchange areas G_ij or plain rows F_ij, one matrix for each channel if anything on the way
+    is coloured; what escapes; the shares (s, 1) or (s, 3) that are lost to mirrors and glass; irradiance (s, 3) from
+    emitting surfaces off mirrors, or None; and the rays cast, by purpose."""
+
+    sides: Sides
+    rows: tuple[Rows, ...]
+    opening: Opening
+    lost: Float64
+    glints: Float64 | None
+    rays: Counter[str]
+    reciprocal: bool
 
 
 @dataclass(frozen=True, eq=False)
 class Transport:
     """Solved light on patch sides.
 
-    escape, lost (s, 1) or (s, 3): shares of a side's hemisphere that are open, and that mirrors and glass swallow.
     incoming (s, 3): irradiance W/m^2 straight from the sources. rays cast, by purpose. mirrored_emission: whether rays
     saw emitting surfaces in mirrors.
     """
 
-    sides: Sides
-    escape: Float64
-    lost: Float64
+    exchange: Exchange
     incoming: Float64
     solution: Solution
     rays: Counter[str]
     mirrored_emission: bool = False
+
+    @property
+    def sides(self) -> Sides:
+        return self.exchange.sides
+
+    @property
+    def escape(self) -> Float64:
+        """(s, 1) or (s, 3) share of a side's hemisphere that is open."""
+        return self.exchange.opening.share.reshape(self.lost.shape)
+
+    @property
+    def lost(self) -> Float64:
+        """(s, 1) or (s, 3) share of a side's hemisphere that mirrors and glass swallow."""
+        return self.exchange.lost
 
     @property
     def reflected(self) -> Float64:
@@ -75,21 +103,6 @@ class Transport:
         return {"emitted": emitted, "absorbed": absorbed, "escaped": escaped, "residual": residual}
 
 
-@dataclass(frozen=True, eq=False)
-class Exchange:
-    """Light between sides: exchange areas G_ij or plain rows F_ij, one matrix for each channel if anything on the way
-    is coloured; what escapes; the shares (s, 1) or (s, 3) that are lost to mirrors and glass; irradiance (s, 3) from
-    emitting surfaces off mirrors, or None; and the rays cast, by purpose."""
-
-    sides: Sides
-    rows: tuple[Rows, ...]
-    opening: Opening
-    lost: Float64
-    glints: Float64 | None
-    rays: Counter[str]
-    reciprocal: bool
-
-
 def reflected(sides: Sides, irradiance: Float64) -> Float64:
     """Radiosity (s, 3) W/m^2 that irradiance (s, 3) on both sides of all patches brings forth."""
     if sides.patches.transmission is None:
@@ -113,7 +126,7 @@ def solve_halves(
         patches = replace(patches, albedo=np.zeros_like(patches.albedo), transmission=None)
     return tuple(
         make_transport(patches, visibility, direct_light, sky, plan.effort, workers, seed=seed, purpose=half)
-        for half in ("first half", "second half")
+        for half in HALVES
     )
 
 
@@ -134,22 +147,32 @@ def make_transport(
     """
     sky = sky.in_colour(patches.coloured)
     exchange = estimate_exchange(patches, visibility, effort, workers, seed, purpose, sky)
+    return fill_with_light(exchange, direct_light, sky, effort, workers, seed=seed, purpose=purpose)
+
+
+def fill_with_light(
+    exchange: Exchange,
+    direct_light: DirectLight,
+    sky: Sky | None,
+    effort: Effort,
+    workers: Workers,
+    *,
+    seed: int,
+    purpose: str,
+) -> Transport:
+    """Direct light on every side, and all that the sides then send to each other. sky: the one of the exchange, or
+    None for its light to be left out."""
     sides = exchange.sides
     incoming, shadow_rays = light_on_sides(sides, direct_light, workers, effort.shadow_rays, seed, purpose)
-    incoming += exchange.opening.light @ sky.irradiance
+    if sky is not None:
+        incoming += exchange.opening.light @ sky.irradiance
     if effort.emitters_by_rays:
         incoming += _received(exchange, np.pi * sides.emission, workers)
     elif exchange.glints is not None:
         incoming += exchange.glints
     solution = _solve(exchange, incoming, effort.tolerance, workers)
     return Transport(
-        sides,
-        exchange.opening.share.reshape(exchange.lost.shape),
-        exchange.lost,
-        incoming,
-        solution,
-        exchange.rays + shadow_rays,
-        mirrored_emission=exchange.glints is not None,
+        exchange, incoming, solution, exchange.rays + shadow_rays, mirrored_emission=exchange.glints is not None
     )
 
 

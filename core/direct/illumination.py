@@ -68,7 +68,7 @@ class DirectLight:
     def __init__(self, sources: Sequence[Source], visibility: Visibility, seed: int) -> None:
         self.lights = lights = [source for source in sources if not isinstance(source, EmitterTree)]
         self._trees = [source for source in sources if isinstance(source, EmitterTree)]
-        self._visibility = visibility
+        self.visibility = visibility
         # A random bit pattern for each light: the sum over the lights seen names their set.
         self._names = stream(seed, "light names").integers(1, 2**40, size=len(lights))
 
@@ -205,11 +205,11 @@ class DirectLight:
         beyond their targets: a lamp that is a surface would be in its own way."""
         ways = np.ascontiguousarray((towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]).T)
         origins = receivers.origins[point]
-        unblocked = self._visibility.unblocked_along(origins, ways)
+        unblocked = self.visibility.unblocked_along(origins, ways)
         rays = Counter(shadow=len(sample))
-        if not self._visibility.veiled:
+        if not self.visibility.veiled:
             return unblocked, None, rays
-        veiled = self._visibility.veiled_along(origins[unblocked], ways[unblocked])
+        veiled = self.visibility.veiled_along(origins[unblocked], ways[unblocked])
         tint = np.zeros((3, len(sample)), dtype=np.float32)
         tint[:, unblocked] = veiled.tint.T
         return unblocked, tint, rays + Counter({"onward": veiled.onward, "cut off": veiled.cut})

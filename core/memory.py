@@ -1,0 +1,190 @@
+"""What a bake leaves behind, so that the next one of the same scene need not start over.
+
+Light is linear in its sources. The light of one lamp alone, its response, is sampled once with the triangles, patches
+and rays of the bake; from then on any change of that lamp's colour or energy is a sum of arrays. And a bake that is
+asked for a smaller error than before goes on sampling where it stood.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field, fields, is_dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from .baked import Baked
+from .clock import Clock
+from .direct.illumination import DirectLight
+from .direct.lamps import place
+from .parallel import Workers
+from .receivers import cell_colours
+from .refinement import Light, fit_alone, refine
+from .result import BakeResult
+from .scene import AreaLamp, Float64, Lamp, PointLamp, Scene, SpotLamp, SunLamp
+from .settings import Settings
+from .sky import Sky
+from .survey import Survey, look_up
+from .transport import HALVES, fill_with_light
+
+#: What tells how bright a lamp is.
+_COLOR = {PointLamp: "intensity", SpotLamp: "intensity", SunLamp: "irradiance", AreaLamp: "radiance"}
+#: A lamp that becomes so many times as bright would want triangles and samples of its own.
+_MOST_GROWTH = 4.0
+
+
+@dataclass(eq=False)
+class _Last:
+    """The scene and the settings as they were given, what was baked, its light, and the responses of lamps by name."""
+
+    scene: Scene
+    settings: Settings
+    baked: Baked
+    light: Light
+    responses: dict[str, Light] = field(default_factory=dict)
+
+
+class Memory:
+    """Keeps the last bake, for as long as it is kept itself."""
+
+    def __init__(self) -> None:
+        self._last: _Last | None = None
+
+    def remember(self, scene: Scene, settings: Settings, baked: Baked, light: Light) -> None:
+        self._last = _Last(scene, settings, baked, light)
+
+    def recall(self, scene: Scene, settings: Settings, clock: Clock) -> BakeResult | None:
+        """The result for a scene that differs from the last one by the brightness of lamps only, or for one that is the
+        same and is to be baked better; None when there is nothing to build upon.
+
+        Raises Cancelled when the clock's progress says so.
+        """
+        last = self._last
+        if last is None or not _same_question(last.settings, settings) or not _same_but_lamps(last.scene, scene):
+            return None
+        changes = lamp_changes(last.scene, scene)
+        if changes is None or not changes.keys() <= {lamp.name for lamp in last.baked.plan.scene.lamps}:
+            return None
+        better = (settings.error, settings.seconds) != (last.settings.error, last.settings.seconds)
+        if changes and better:
+            return None
+        survey = last.baked.survey
+        rays = Counter({purpose: -count for purpose, count in survey.rays.items()})
+        with Workers(settings.threads, clock.progress) as workers:
+            survey.workers = workers
+            if better:
+                last.light, last.settings = _refined(last.baked, settings, workers, clock), settings
+            for name in changes.keys() - last.responses.keys():
+                with clock.stage("relight", 0.1):
+                    last.responses[name] = _response(last.baked, name, last.light.alphas, workers, rays)
+        rays.update(survey.rays)
+        result = last.baked.result(_relit(last, changes), settings, clock)
+        result.report.rays = {"total": rays.total(), **{purpose: count for purpose, count in rays.items() if count}}
+        return result
+
+
+def lamp_changes(before: Scene, after: Scene) -> dict[str, Float64] | None:
+    """By how much (3,) the colour of each lamp has changed, of those where it has; None when lamps differ by more."""
+    old, new = ({lamp.name: lamp for lamp in scene.lamps} for scene in (before, after))
+    if old.keys() != new.keys() or len(old) != len(before.lamps):
+        return None
+    changes = {}
+    for name, lamp in old.items():
+        one, other = _color(lamp), _color(new[name])
+        if type(lamp) is not type(new[name]) or not same(_unit(lamp), _unit(new[name])):
+            return None
+        if (other > _MOST_GROWTH * one).any():
+            return None
+        if (one != other).any():
+            changes[name] = other - one
+    return changes
+
+
+def same(one: Any, other: Any) -> bool:
+    """Whether two values, or two trees of dataclasses, tuples and arrays, are equal throughout."""
+    if one is other:
+        return True
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, np.ndarray):
+        return bool(np.array_equal(one, other))
+    if isinstance(one, tuple):
+        return len(one) == len(other) and all(map(same, one, other))
+    if is_dataclass(one):
+        return all(same(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
+    return bool(one == other)
+
+
+def _same_question(before: Settings, after: Settings) -> bool:
+    """Whether the same is asked, but for how well, how fast and which layers."""
+    return same(*(replace(s, error=None, seconds=None, threads=0, layers=()) for s in (before, after)))
+
+
+def _same_but_lamps(before: Scene, after: Scene) -> bool:
+    return same(*(replace(scene, lamps=(), warnings=()) for scene in (before, after)))
+
+
+def _color(lamp: Lamp) -> Float64:
+    return np.array(getattr(lamp, _COLOR[type(lamp)]))
+
+
+def _unit(lamp: Lamp) -> Lamp:
+    """The same lamp in plain white, of one unit."""
+    bright: dict[str, Any] = {_COLOR[type(lamp)]: (1.0, 1.0, 1.0)}
+    return replace(lamp, **bright)
+
+
+def _refined(baked: Baked, settings: Settings, workers: Workers, clock: Clock) -> Light:
+    """The light after more passes, until the new question is answered."""
+    return refine(baked.survey, baked.plan.scene, settings, baked.plan.effort, workers, clock, lambda _: None)
+
+
+def _relit(last: _Last, changes: dict[str, Float64]) -> Light:
+    """The light with the change (3,) of each lamp times its response."""
+    light = last.light
+    if not changes:
+        return light
+    brightness = doubt = _brightness(last.baked, light)
+    for name, change in changes.items():
+        response = last.responses[name]
+        light = replace(
+            light,
+            lamps=np.maximum(light.lamps + change * response.lamps, 0.0),
+            reflected=np.maximum(light.reflected + change * response.reflected, 0.0),
+        )
+        doubt += float(np.abs(change).mean()) * _brightness(last.baked, response)
+    # Each part of the light is as sure as the whole was; what was taken away leaves its error behind.
+    return replace(
+        light,
+        error=light.error.scaled(doubt / (_brightness(last.baked, light) or doubt or 1.0)),
+        cell_error=light.cell_error * (doubt / (brightness or 1.0)) ** 2,
+    )
+
+
+def _response(baked: Baked, name: str, alphas: tuple[float, ...], workers: Workers, rays: Counter[str]) -> Light:
+    """The light of one lamp alone, in plain white, with the smoothing of the whole. Counts its rays by purpose."""
+    plan, survey = baked.plan, baked.survey
+    effort, seed, black = replace(plan.effort, emitters_by_rays=False), survey.seed, Sky.of((0.0, 0.0, 0.0))
+    lamp = next(lamp for lamp in plan.scene.lamps if lamp.name == name)
+    light = DirectLight([place(_unit(lamp), baked.patches.space)], survey.visibility, seed)
+    halves = []
+    for half, purpose in zip(baked.halves, HALVES, strict=False):
+        exchange = replace(half.exchange, glints=None)
+        halves.append(fill_with_light(exchange, light, None, effort, workers, seed=seed, purpose=purpose))
+        rays.update(halves[-1].rays - exchange.rays)
+    around = look_up(baked.patches, survey.visibility, tuple(halves), black, effort, seed)
+    alone = Survey(survey.receivers, light, around, effort, seed, workers)
+    while alone.passes < survey.passes:
+        alone.run_pass()
+    alone.refine_boundaries(effort.boundary_passes)
+    rays.update(alone.rays)
+    return fit_alone(alone, alphas)
+
+
+def _brightness(baked: Baked, light: Light) -> float:
+    """Mean reflected radiance on the receivers, W/(m^2 sr)."""
+    receivers = baked.survey.receivers
+    arriving = (light.lamps + light.reflected + light.emitted + light.sky).mean(axis=1)
+    on_cells = arriving[receivers.corner_vertex[receivers.cells.element]].mean(axis=1)
+    albedo = cell_colours(baked.plan.scene, receivers).albedo.mean(axis=1)
+    return float(receivers.cells.area @ (albedo * on_cells) / receivers.cells.area.sum() / np.pi)
