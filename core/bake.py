@@ -10,22 +10,22 @@ from .bending import Bends
 from .check import check_scene
 from .clock import Clock
 from .direct.emitters import emitting_panels
-from .direct.illumination import DirectLight
+from .direct.illumination import DirectLight, Source
 from .direct.lamps import place
 from .direct.sky import split_bright
 from .memory import Memory
 from .parallel import Workers
 from .patch_refinement import patches_by_light
 from .patches import make_patches, split_objects, unit_space
-from .plan import Effort, plan
+from .plan import Effort, Plan, plan
 from .progress import Progress
-from .receivers import make_receivers
+from .receivers import Receivers, make_receivers
 from .refinement import Light, average_light, refine
 from .result import BakeResult
 from .scene import Scene, SkyMap
 from .settings import Settings
 from .sky import Sky
-from .survey import Survey, look_up
+from .survey import Surroundings, Survey, look_up
 from .transport import solve_halves
 from .visibility import Visibility
 
@@ -67,29 +67,16 @@ def bake(
             receivers = make_receivers(scene, space, settings, start)
             lights = [place(lamp, space) for lamp in (*scene.lamps, *suns)] + emitting_panels(around, space)
             if clock.progress.watched:
-                # A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting.
-                coarse = make_patches(around, space, split_objects(around, 1))
-                straight = DirectLight(lights, Visibility(coarse.corners, coarse.optics), settings.seed)
-                first = Survey(receivers, straight, None, effort, settings.seed, workers)
-                first.run_pass()
-                show(Baked(planned, coarse, (), first), average_light(first))
+                show(*first_light(planned, around, receivers, lights, settings, workers))
             patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
         with clock.stage("tessellate", 0.28):
-            adaptation = Adaptation(direct_light, surroundings, settings.seed, workers)
-            rays: dict[str, int] = {}
-            if effort.coarsest > 1:
-                limit = len(receivers.cells) + effort.triangles
-                bends = Bends(direct_light, surroundings, effort, settings.seed, workers)
-                # Contacts get the rest.
-                receivers = bends.refine(scene, receivers, 3 * limit // 4)
-                rays = bends.rays
-            else:
-                limit = len(receivers.cells) + int(effort.growth * effort.triangles)
-            receivers = adaptation.refine_receivers(receivers, limit, effort.error, shadows=effort.coarsest <= 1)
+            receivers, rays = finer_where_it_matters(
+                scene, receivers, direct_light, surroundings, effort, settings.seed, workers
+            )
         survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
         survey.rays.update(rays)
         baked = Baked(planned, patches, halves, survey)
@@ -98,3 +85,35 @@ def bake(
         memory.remember(given, settings, baked, light)
     with clock.stage("layers", 0.97):
         return baked.result(light, settings, clock)
+
+
+def first_light(
+    planned: Plan, around: Scene, receivers: Receivers, lights: list[Source], settings: Settings, workers: Workers
+) -> tuple[Baked, Light]:
+    """A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting."""
+    patches = make_patches(around, receivers.space, split_objects(around, 1))
+    straight = DirectLight(lights, Visibility(patches.corners, patches.optics), settings.seed)
+    survey = Survey(receivers, straight, None, planned.effort, settings.seed, workers)
+    survey.run_pass()
+    return Baked(planned, patches, (), survey), average_light(survey)
+
+
+def finer_where_it_matters(
+    scene: Scene,
+    receivers: Receivers,
+    direct_light: DirectLight,
+    surroundings: Surroundings | None,
+    effort: Effort,
+    seed: int,
+    workers: Workers,
+) -> tuple[Receivers, dict[str, int]]:
+    """Triangles split where light bends, if they start coarse, and where it breaks; and the rays it took to tell."""
+    adaptation = Adaptation(direct_light, surroundings, seed, workers)
+    if effort.coarsest <= 1:
+        limit = len(receivers.cells) + int(effort.growth * effort.triangles)
+        return adaptation.refine_receivers(receivers, limit, effort.error, shadows=True), {}
+    limit = len(receivers.cells) + effort.triangles
+    bends = Bends(direct_light, surroundings, effort, seed, workers)
+    # Contacts get the rest.
+    bent = bends.refine(scene, receivers, 3 * limit // 4)
+    return adaptation.refine_receivers(bent, limit, effort.error, shadows=False), bends.rays
