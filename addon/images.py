@@ -43,7 +43,7 @@ def read_image(
     white pixel its images are darker than half. Pixels are therefore divided, and mixed as Cycles does it if `smooth`;
     where there are many, each keeps the mean of its parts. Large images come reduced to `LARGEST` pixels along a side.
     premultiplied: the colour is to be multiplied by the alpha, as in Cycles where no node asks for the alpha.
-    Raises UnreadableImage for tiles, films and colour spaces that only Blender itself can read.
+    Raises UnreadableImage for tiles, films, colour spaces and kinds of alpha that only Blender itself can read.
     """
     if image.source not in {"FILE", "GENERATED"}:
         raise UnreadableImage(f"of the kind {image.source.lower()}")
@@ -58,8 +58,12 @@ def read_image(
     if image.colorspace_settings.is_data or image.alpha_mode in {"NONE", "CHANNEL_PACKED"}:
         divide = False
     else:
-        # Blender keeps bytes without their alpha and floats with it; Cycles mixes both with it.
-        divide = not premultiplied and bool((pixels[..., 3] < 1.0).any())
+        # Blender keeps bytes without their alpha and floats with it; Cycles mixes both with it. What it makes of floats
+        # without it has changed from version to version.
+        clear = bool((pixels[..., 3] < 1.0).any())
+        if clear and image.is_float and image.alpha_mode == "STRAIGHT":
+            raise UnreadableImage("of floating-point pixels with a straight alpha")
+        divide = clear and not premultiplied
         if not image.is_float:
             pixels[..., :3] *= pixels[..., 3:]
     if image.alpha_mode == "NONE":

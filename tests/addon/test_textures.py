@@ -19,6 +19,7 @@ def make_image(pixels, space="sRGB", alpha=False, is_float=False):
     height, width = pixels.shape[:2]
     image = bpy.data.images.new("Picture", width, height, alpha=alpha, float_buffer=is_float)
     image.colorspace_settings.name = space
+    image.alpha_mode = "PREMUL" if is_float else "STRAIGHT"
     image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))])[..., :4].astype(np.float32).ravel())
     return image
 
