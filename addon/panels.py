@@ -108,9 +108,9 @@ class LastBakeSection:
                 grid.prop_enum(settings, "layer", layer)
 
         row = layout.row(align=True)
-        row.operator("object.radiosity_bake", text="Bake Again", icon="FILE_REFRESH")
-        row.operator("object.radiosity_refine", icon="ADD")
-        row.operator("object.radiosity_clear", text="Clear", icon="TRASH")
+        row.operator("object.radiosity_bake", text="Bake Again")
+        row.operator("object.radiosity_refine")
+        row.operator("object.radiosity_clear", text="Clear")
         column = layout.column(align=True)
         _figure(column, "Baked", count("object", len(report["objects"])))
         _figure(column, "Triangles", f"{sum(entry['triangles'] for entry in report['objects']):,}")

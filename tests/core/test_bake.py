@@ -466,3 +466,22 @@ def test_the_stated_error_is_the_true_one_within_a_factor_of_two(room):
     true = surface_error(coarse, fine)
     stated = coarse.report.estimated_error["total"]
     assert true / 2 <= stated <= true * 2
+
+
+def test_watching_shows_light_from_the_start_and_changes_nothing(build):
+    scene = Scene((build.quad(), build.box(low=(0.2, 0.2, 0), high=(0.5, 0.5, 0.4))), (WHITE,), sky=SKY)
+    shown = []
+
+    class Shown(Progress):
+        def show(self, so_far):
+            shown.append((self.stage, so_far()))
+
+    watched, alone = (preview(scene, progress, triangles=100) for progress in (Shown(watched=True), Progress()))
+    stages = [stage for stage, _ in shown]
+    assert stages[0] == "tessellate"
+    assert {"gather", "fit"} <= set(stages)
+    for one, two in zip(watched.objects, alone.objects, strict=True):
+        assert np.array_equal(one.layers["combined"], two.layers["combined"])
+    # The last picture is the result; the first, rough one has no bounce yet, and nobody knows its error.
+    assert np.array_equal(shown[-1][1].objects[0].layers["combined"], watched.objects[0].layers["combined"])
+    assert shown[0][1].report.estimated_error == {}
