@@ -18,6 +18,7 @@ from .sampling import stream
 from .scene import Scene
 from .settings import Settings
 from .tessellation import edge_for_count, predicted_count
+from .textures import varies
 from .visibility import Visibility
 
 #: Effects that need rays over the hemisphere.
@@ -124,10 +125,12 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     finer = min(max(0.02 / asked, 0.25), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
+    # Where light bends is no guide to where a texture has its detail.
+    textured = any(varies(scene, o) for o in scene.receivers())
     return Effort(
         error=asked,
         triangles=settings.triangles,
-        coarsest=_COARSEST if settings.tessellate and settings.size is None else 1.0,
+        coarsest=_COARSEST if settings.tessellate and settings.size is None and not textured else 1.0,
         growth=2.0,
         estimator=estimator,
         patches=patches,

@@ -13,6 +13,7 @@ from radiosity_baker.core.direct.emitters import emitting_panels, emitting_piece
 from radiosity_baker.core.effects import choose_effects
 from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.scene import ALBEDO_LIMIT, Scene, SceneError, Surface, Texture
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.textures import even_points, look_up, triangle_colours
@@ -203,6 +204,12 @@ def test_the_plan_names_what_is_textured(sheet, build):
     assert not reasons["textured emission"].active
     plain = {e.name: e.active for e in choose_effects(build.furnished_room(), Settings())[0]}
     assert not plain["albedo textures"]
+
+
+def test_textured_receivers_do_not_start_coarse(sheet, build):
+    """Their detail is not where light bends, so it would be missed."""
+    assert choose_effort(sheet(checker(8)), Settings()).coarsest == 1
+    assert choose_effort(build.furnished_room(), Settings()).coarsest > 1
 
 
 def test_a_texture_needs_a_place(sheet):
