@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import bpy
@@ -23,6 +23,9 @@ from .images import MISSING, Extension, UnreadableImage, has_pixels, read_image
 
 #: What Cycles gives faces without a material: its default Principled BSDF, of which `_principled` makes this.
 DEFAULT_SURFACE = Surface("", albedo=(0.8, 0.8, 0.8))
+
+#: Roughness up to which glass looks clear.
+_CLEAR = 0.1
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
@@ -67,12 +70,26 @@ def read_material(
     even = shading.albedo.ndim == 1 and shading.color_attribute is None and not reader.unread
     if even and shading.albedo.max() > ALBEDO_LIMIT:
         reader.warn(f"reflects more than it receives; its colour is limited to {ALBEDO_LIMIT}. Lower the base colour.")
-    albedo, albedo_texture = reader.split(np.clip(shading.albedo, 0.0, ALBEDO_LIMIT))
+    reflected, through = reader.alike(shading.albedo, shading.transmission)
+    diffuse = np.clip(reflected + through, 0.0, ALBEDO_LIMIT)
+    albedo, albedo_texture = reader.split(diffuse)
+    # A texture multiplies what leaves either side, so the shares of the two are those of their means.
+    whole = _mean(reflected) + _mean(through)
+    front = np.divide(_mean(reflected), whole, out=np.ones(3), where=whole > 0.0)
+    opacity, opacity_texture = reader.split(np.clip(np.repeat(shading.opacity, 3, axis=-1), 0.0, 1.0))
     emission, emission_texture = reader.split(np.maximum(shading.emission, 0.0))
     surface = MaterialSurface(
         material.name,
-        albedo=albedo,
+        albedo=_rgb(albedo * front),
+        transmission=_rgb(albedo * (1.0 - front)),
         emission=emission,
+        opacity=opacity[0],
+        opacity_texture=opacity_texture,
+        transparent=_rgb(np.clip(shading.clear, 0.0, 1.0)),
+        mirror=_rgb(np.clip(shading.mirror, 0.0, 1.0)),
+        glass=_rgb(np.clip(shading.glass, 0.0, 1.0)),
+        ior=shading.ior,
+        roughness=shading.roughness,
         albedo_texture=albedo_texture,
         emission_texture=emission_texture,
         placement=reader.placement,
@@ -100,11 +117,20 @@ def read_lamp_nodes(lamp: bpy.types.Light) -> tuple[RGB, list[str]]:
 
 @dataclass(frozen=True)
 class _Shading:
-    """albedo and emission: (3,) or (h, w, 3) float64. color_attribute: multiplies the albedo, as in MaterialSurface."""
+    """What a shader does, as in Surface: albedo, emission and transmission (3,) or (h, w, 3) float64 and opacity (1,)
+    or (h, w, 1) may be images; clear (the tint of what goes straight through), mirror and glass are (3,).
+    color_attribute: multiplies the albedo, as in MaterialSurface."""
 
     albedo: Float64 = field(default_factory=lambda: np.zeros(3))
     emission: Float64 = field(default_factory=lambda: np.zeros(3))
     color_attribute: str | None = None
+    transmission: Float64 = field(default_factory=lambda: np.zeros(3))
+    opacity: Float64 = field(default_factory=lambda: np.ones(1))
+    clear: Float64 = field(default_factory=lambda: np.ones(3))
+    mirror: Float64 = field(default_factory=lambda: np.zeros(3))
+    glass: Float64 = field(default_factory=lambda: np.zeros(3))
+    ior: float = 1.0
+    roughness: float = 0.0
 
 
 class Unreadable(ValueError):
@@ -149,8 +175,7 @@ class _TreeReader:
             return _Shading()
         converter = CONVERTERS.get(source.node.bl_idname)
         if converter is None:
-            report = self.warn if source.node.bl_idname in NOT_DIFFUSE else self.cannot_read
-            report(
+            self.cannot_read(
                 f"uses the node {source.node.bl_label}, which has no diffuse part or is not read yet: it is taken as "
                 "black. Use Diffuse BSDF, Principled BSDF, Emission, Mix Shader or Add Shader."
             )
@@ -196,6 +221,13 @@ class _TreeReader:
 
     def sum(self, one: _Shading, share: Float64, two: _Shading, other: Float64) -> _Shading:
         """Shares (1,) or (h, w, 1) of two shadings together."""
+        if not one.opacity.any():
+            one, share, two, other = two, other, one, share
+        if not two.opacity.any():
+            # Holes in a surface: its own light is that of what is left.
+            return self.with_holes(one, share, two, other)
+        if one.opacity.min() < 1.0 or two.opacity.min() < 1.0:
+            return self.sum_of_sheer(one, float(share.mean()), two, float(other.mean()))
         if one.color_attribute != two.color_attribute and one.albedo.any() and two.albedo.any():
             self.cannot_read("mixes a colour attribute with other colours: it is left out.")
         attribute = one.color_attribute if one.albedo.any() else two.color_attribute
@@ -203,9 +235,46 @@ class _TreeReader:
             self.check_black_beyond(one.albedo, two.albedo, one.emission, two.emission, share)
         except Unreadable as problem:
             self.cannot_read(f"mixes shaders, which {problem}.")
-        first, second, share, other = self.alike(one.albedo, two.albedo, share, other)
-        glow, second_glow, glow_share, glow_other = self.alike(one.emission, two.emission, share, other)
-        return _Shading(first * share + second * other, glow * glow_share + second_glow * glow_other, attribute)
+
+        def mixed(first: Float64, second: Float64) -> Float64:
+            first, second, first_share, second_share = self.alike(first, second, share, other)
+            return np.asarray(first * first_share + second * second_share)
+
+        def strongest(name: str, of: str) -> float:
+            """Of two mirrors or glasses only one index of refraction or roughness can be kept."""
+            return float(getattr(one if getattr(one, of).max() >= getattr(two, of).max() else two, name))
+
+        return _Shading(
+            mixed(one.albedo, two.albedo),
+            mixed(one.emission, two.emission),
+            attribute,
+            transmission=mixed(one.transmission, two.transmission),
+            mirror=one.mirror * share.mean() + two.mirror * other.mean(),
+            glass=one.glass * share.mean() + two.glass * other.mean(),
+            ior=strongest("ior", "glass"),
+            roughness=strongest("roughness", "mirror"),
+        )
+
+    def with_holes(self, one: _Shading, share: Float64, clear: _Shading, other: Float64) -> _Shading:
+        """A share of a shading, and through the other, which is clear, one sees what is behind."""
+        opacity, share = self.alike(one.opacity, share)
+        before, after = float(share.mean() * (1.0 - one.opacity.mean())), float(other.mean())
+        tint = (before * one.clear + after * clear.clear) / max(before + after, 1e-12)
+        return replace(one, opacity=opacity * share, clear=tint)
+
+    def sum_of_sheer(self, one: _Shading, share: float, two: _Shading, other: float) -> _Shading:
+        """Shares of two shadings of which at least one lets light through; its holes become an even veil."""
+        covers = share * float(one.opacity.mean()), other * float(two.opacity.mean())
+        opens = share - covers[0], other - covers[1]
+        total = max(sum(covers), 1e-12)
+        solid = self.sum(
+            replace(one, opacity=np.ones(1)),
+            np.array([covers[0] / total]),
+            replace(two, opacity=np.ones(1)),
+            np.array([covers[1] / total]),
+        )
+        tint = (opens[0] * one.clear + opens[1] * two.clear) / max(sum(opens), 1e-12)
+        return replace(solid, opacity=np.array([min(total, 1.0)]), clear=tint)
 
     def alike(self, *values: Float64) -> tuple[Float64, ...]:
         """The same values, images among them with as many pixels as the largest has; or with their means alone where
@@ -292,21 +361,79 @@ def _principled(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
     """
     metallic = reader.amount(node.inputs["Metallic"])
     transmission = reader.amount(node.inputs["Transmission Weight"])
-    if metallic.max() > 0.0:
-        reader.warn(f"is {metallic.mean():.0%} metallic: mirror reflections are not baked, so that share stays dark.")
-    if transmission.max() > 0.0:
-        reader.warn(
-            f"transmits {transmission.mean():.0%} of the light: it is baked as opaque, and that share stays dark."
-        )
-    if reader.number(node.inputs["Alpha"]) < 1.0:
-        reader.warn("is transparent (Alpha below 1): it is baked as opaque.")
+    roughness = reader.number(node.inputs["Roughness"])
     colour, attribute = reader.tint(node.inputs["Base Color"])
     base = rough_albedo(colour, reader.number(node.inputs.get("Diffuse Roughness")))
+    tint = _mean(base)
+    metal, passes = float(metallic.mean()), float(((1.0 - metallic.mean()) * transmission).mean())
+    if passes > 0.0:
+        _warn_of_rough_glass(reader, roughness)
     base, metallic, transmission = reader.alike(base, metallic, transmission)
     glow, strength = reader.alike(
         reader.colour(node.inputs["Emission Color"]), reader.amount(node.inputs["Emission Strength"])
     )
-    return _Shading(base * (1.0 - metallic) * (1.0 - transmission), glow * strength, attribute)
+    return _Shading(
+        base * (1.0 - metallic) * (1.0 - transmission),
+        glow * strength,
+        attribute,
+        opacity=np.clip(reader.amount(node.inputs["Alpha"]), 0.0, 1.0),
+        mirror=metal * metal_reflectance(tint),
+        glass=passes * np.sqrt(np.maximum(tint, 0.0)),
+        ior=reader.number(node.inputs["IOR"]),
+        roughness=roughness,
+    )
+
+
+def _transparent(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
+    return _Shading(opacity=np.zeros(1), clear=_mean(reader.colour(node.inputs["Color"])))
+
+
+def _translucent(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
+    return _Shading(transmission=reader.colour(node.inputs["Color"]))
+
+
+def _glossy(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
+    roughness = reader.number(node.inputs["Roughness"])
+    return _Shading(mirror=_mean(reader.colour(node.inputs["Color"])), roughness=roughness)
+
+
+def _metal(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
+    if getattr(node, "fresnel_type", "F82") != "F82":
+        reader.warn("has a metal by index of refraction and extinction: its base colour is used. Choose F82 Tint.")
+    tint = _mean(reader.colour(node.inputs["Base Color"]))
+    return _Shading(mirror=metal_reflectance(tint), roughness=reader.number(node.inputs["Roughness"]))
+
+
+def _glass(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
+    _warn_of_rough_glass(reader, reader.number(node.inputs["Roughness"]))
+    ior = reader.number(node.inputs["IOR"]) if node.bl_idname == "ShaderNodeBsdfGlass" else 1.0
+    return _Shading(glass=_mean(reader.colour(node.inputs["Color"])), ior=ior)
+
+
+def _holdout(_: _TreeReader, node: bpy.types.Node) -> _Shading:  # noqa: ARG001
+    return _Shading()
+
+
+def _warn_of_rough_glass(reader: _TreeReader, roughness: float) -> None:
+    if roughness > _CLEAR:
+        reader.warn(
+            f"is glass of roughness {roughness:.2f}: light goes straight through it in the bake, and is not scattered. "
+            "For frosted glass mix in a Translucent BSDF."
+        )
+
+
+def metal_reflectance(colour: Float64) -> Float64:
+    """Share (3,) of even light that a metal with this colour straight on mirrors.
+
+    Schlick's reflectance c + (1 - c)(1 - cos)^5 (1994), which Principled's metal has with a white tint, averaged over
+    the hemisphere: c + (1 - c) / 21.
+    """
+    return np.asarray(colour + (1.0 - colour) / 21.0)
+
+
+def _mean(values: Float64) -> Float64:
+    """(k,) of an image (h, w, k), or of what is constant already."""
+    return values.reshape(-1, values.shape[-1]).mean(axis=0)
 
 
 def _mix(reader: _TreeReader, node: bpy.types.Node) -> _Shading:
@@ -340,20 +467,16 @@ CONVERTERS: dict[str, Callable[[_TreeReader, bpy.types.Node], _Shading]] = {
     "ShaderNodeSubsurfaceScattering": _subsurface,
     "ShaderNodeEmission": _emission,
     "ShaderNodeBackground": _emission,
+    "ShaderNodeBsdfTransparent": _transparent,
+    "ShaderNodeBsdfTranslucent": _translucent,
+    "ShaderNodeBsdfAnisotropic": _glossy,
+    "ShaderNodeBsdfGlossy": _glossy,
+    "ShaderNodeBsdfMetallic": _metal,
+    "ShaderNodeBsdfGlass": _glass,
+    "ShaderNodeBsdfRefraction": _glass,
+    "ShaderNodeHoldout": _holdout,
     "ShaderNodeMixShader": _mix,
     "ShaderNodeAddShader": _add,
-}
-
-
-#: Shaders that send no light back in all directions.
-NOT_DIFFUSE = {
-    "ShaderNodeBsdfAnisotropic",
-    "ShaderNodeBsdfGlass",
-    "ShaderNodeBsdfGlossy",
-    "ShaderNodeBsdfMetallic",
-    "ShaderNodeBsdfRefraction",
-    "ShaderNodeBsdfTransparent",
-    "ShaderNodeHoldout",
 }
 
 

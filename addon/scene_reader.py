@@ -157,10 +157,12 @@ class _Reading:
         if not (receives or obj.visible_diffuse or obj.visible_shadow):
             return
         self.warnings += warn_of_linking(name, obj)
-        if not (obj.visible_diffuse and obj.visible_shadow):
+        if not obj.visible_diffuse:
             self.warnings.append(
                 f"Object '{name}' is visible to some rays only (Ray Visibility): all see it in the bake."
             )
+        if obj.is_holdout or obj.is_shadow_catcher:
+            self.warnings.append(f"Object '{name}' is a holdout or shadow catcher: it is baked as a usual one.")
         mesh = self._mesh(obj)
         if not len(mesh.corners):
             return
@@ -189,6 +191,7 @@ class _Reading:
                 surface=surface,
                 corner_normals=_world_normals(mesh.corner_normals, matrix[:3, :3], turn),
                 receives=receives,
+                casts_shadow=obj.visible_shadow,
                 uv=uv if uv is None else uv[:, turn],
                 colors=colors if colors is None else colors[:, turn],
                 present=casts and bounces,

@@ -136,7 +136,7 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
 
 
 def transparency(scene: Scene, _: Settings) -> Effect:
-    sheer = _used(scene, lambda surface: surface.opacity < 1.0)
+    sheer = _used(scene, _is_sheer)
     shadowless = [o.name for o in scene.objects if not o.casts_shadow]
     if sheer or shadowless:
         reasons = [f"{_names(sheer)} let light through"] * bool(sheer)
@@ -164,9 +164,7 @@ def clear_glass(scene: Scene, _: Settings) -> Effect:
 
 def goes_on(scene: Scene) -> bool:
     """Whether rays go on from some surface, or through it."""
-    return bool(
-        _used(scene, lambda s: s.opacity < 1.0 or max(np.concatenate([s.transmission, s.mirror, s.glass])) > 0.0)
-    )
+    return bool(_used(scene, lambda s: _is_sheer(s) or max(np.concatenate([s.transmission, s.mirror, s.glass])) > 0.0))
 
 
 def albedo_textures(scene: Scene, _: Settings) -> Effect:
@@ -204,6 +202,10 @@ def emitters_by_rays(scene: Scene) -> bool:
 def _lamps(name: str, kind: type, scene: Scene) -> Effect:
     names = [lamp.name for lamp in scene.lamps if isinstance(lamp, kind)]
     return Effect(name, bool(names), _names(names) if names else "none in the scene")
+
+
+def _is_sheer(surface: Surface) -> bool:
+    return surface.opacity < 1.0 or surface.opacity_texture is not None
 
 
 def _used(scene: Scene, has: Callable[[Surface], bool]) -> list[str]:
@@ -296,9 +298,8 @@ def _without_sky(scene: Scene) -> Scene:
 
 
 def _opaque(scene: Scene) -> Scene:
-    return replace(
-        _with_surfaces(scene, opacity=1.0), objects=tuple(replace(o, casts_shadow=True) for o in scene.objects)
-    )
+    objects = tuple(replace(o, casts_shadow=True) for o in scene.objects)
+    return replace(_with_surfaces(scene, opacity=1.0, opacity_texture=None), objects=objects)
 
 
 def _with_surfaces(scene: Scene, **changes: Any) -> Scene:

@@ -14,7 +14,8 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from .sampling import frames
-from .scene import Bool, Float64, Int32, Scene, Surface
+from .scene import Bool, Float64, Int32, Scene, Surface, Texture
+from .textures import look_up
 
 #: What may happen to a ray, in the order of the columns of `Optics.tints`.
 CLEAR, GLASS, GLINT, MIRROR, ABSORBED, STOPS = range(6)
@@ -46,7 +47,8 @@ class Optics:
     normals, base (t, 3): unit normal and any point of each triangle; surface (t,); goes_on, veils, blocks (t,): rays
     may go on there, shadow rays pass in part, or are stopped for good. opacity (s,); shares (s, 3): probabilities to
     pass where nothing is opaque, and on the opaque part to meet glass and a mirror; tints (s, 6, 3) after each outcome;
-    clear, glass (s, 3) tints of shadow rays; ior, roughness (s,). tinted: whether any tint is not one.
+    clear, glass (s, 3) tints of shadow rays; ior, roughness (s,). tinted: whether any tint is not one. holes: textures
+    of the opacity by surface; corners, uv (t, 3, 2 and 3) of the triangles, None without holes.
     """
 
     normals: Float64
@@ -63,6 +65,9 @@ class Optics:
     ior: Float64
     roughness: Float64
     tinted: bool
+    holes: dict[int, Texture]
+    corners: Float64
+    uv: Float64 | None
 
     def meet(self, triangle: Int32, origins: Float64, directions: Float64) -> Float64:
         """Points (n, 3) where rays cross the planes of the triangles (n,) they hit."""
@@ -72,12 +77,23 @@ class Optics:
         distance = np.divide(height, slope, out=np.zeros_like(height), where=slope != 0.0)
         return origins + distance[:, None] * directions
 
-    def scatter(self, triangle: Int32, directions: Float64, rng: np.random.Generator) -> Onward:
-        """What becomes of rays with directions (n, 3) at the triangles (n,) they hit."""
+    def opacity_at(self, triangle: Int32, points: Float64) -> Float64:
+        """Opacity (n,) at points (n, 3) of the triangles (n,)."""
+        surface = self.surface[triangle]
+        opacity = self.opacity[surface]
+        for number, texture in self.holes.items():
+            own = np.flatnonzero(surface == number)
+            if len(own) and self.uv is not None:
+                weights = barycentric(self.corners[triangle[own]], points[own])
+                opacity[own] *= look_up(texture, np.einsum("nc,nck->nk", weights, self.uv[triangle[own]]))[:, 0]
+        return opacity
+
+    def scatter(self, triangle: Int32, points: Float64, directions: Float64, rng: np.random.Generator) -> Onward:
+        """What becomes of rays with directions (n, 3) at the points (n, 3) where they hit the triangles (n,)."""
         surface, normal = self.surface[triangle], self.normals[triangle]
         unit = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         slope = np.einsum("nk,nk->n", unit, normal)
-        opacity = self.opacity[surface]
+        opacity = self.opacity_at(triangle, points)
         shares = self.shares[surface]
         glint = fresnel(np.abs(slope), self.ior[surface])
         likely = np.stack(
@@ -96,20 +112,25 @@ class Optics:
         unit[turned] = mirrored(unit[turned], facing, rough, rng)
         return Onward(outcome, unit, self.tints[surface, outcome])
 
-    def passing(self, triangle: Int32, directions: Float64) -> Float64:
-        """Share (n, 3) of the light along directions (n, 3) that goes straight through the triangles (n,)."""
+    def passing(self, triangle: Int32, points: Float64, directions: Float64) -> Float64:
+        """Share (n, 3) of the light along directions (n, 3) that goes straight through points of the triangles (n,)."""
         surface = self.surface[triangle]
         slope = np.einsum("nk,nk->n", directions, self.normals[triangle]) / np.linalg.norm(directions, axis=1)
-        opacity = self.opacity[surface]
+        opacity = self.opacity_at(triangle, points)
         enters = opacity * (1.0 - fresnel(np.abs(slope), self.ior[surface]))
         return (1.0 - opacity)[:, None] * self.clear[surface] + enters[:, None] * self.glass[surface]
 
 
-def make_optics(scene: Scene, surface: Int32, shadowless: Bool, corners: Float64, normals: Float64) -> Optics | None:
+def make_optics(
+    scene: Scene, surface: Int32, shadowless: Bool, corners: Float64, normals: Float64, uv: Float64 | None
+) -> Optics | None:
     """For triangles with corners (t, 3, 3), unit normals (t, 3), surface (t,) into the scene's; shadowless (t,): lamps
-    shine through them. None when all rays stop where they first meet something and everything casts shadows."""
+    shine through them; uv (t, 3, 2) of the corners where opacity varies. None when all rays stop where they first meet
+    something and everything casts shadows."""
     surfaces = scene.surfaces
     opacity = np.array([s.opacity for s in surfaces])
+    holes = {number: s.opacity_texture for number, s in enumerate(surfaces) if s.opacity_texture is not None}
+    sheer = (opacity < 1.0) | np.isin(np.arange(len(surfaces)), list(holes))
     clear, glass, mirror = (
         np.array([getattr(s, name) for s in surfaces], dtype=np.float64) for name in ("transparent", "glass", "mirror")
     )
@@ -117,8 +138,8 @@ def make_optics(scene: Scene, surface: Int32, shadowless: Bool, corners: Float64
     stops = np.array([stopping_share(s) for s in surfaces])
     room = np.divide(1.0 - stops, most_glass + most_mirror, out=np.ones_like(stops), where=stops < 1.0)
     shares = np.stack([most_clear, most_glass * room, most_mirror * room], axis=1)
-    lets_through = (opacity < 1.0) & (most_clear > 0.0) | (opacity > 0.0) & (most_glass > 0.0)
-    special = (opacity < 1.0) | (opacity > 0.0) & (most_glass + most_mirror > 0.0)
+    lets_through = sheer & (most_clear > 0.0) | (opacity > 0.0) & (most_glass > 0.0)
+    special = sheer | (opacity > 0.0) & (most_glass + most_mirror > 0.0)
     if not special[np.unique(surface)].any() and not shadowless.any():
         return None
     tints = np.ones((len(surfaces), 6, 3))
@@ -143,8 +164,22 @@ def make_optics(scene: Scene, surface: Int32, shadowless: Bool, corners: Float64
         glass=glass,
         ior=np.array([s.ior for s in surfaces]),
         roughness=np.array([s.roughness for s in surfaces]),
+        holes=holes,
+        corners=corners,
+        uv=uv,
         tinted=bool(np.abs(tints[np.unique(surface)] - 1.0).max() > 1e-6),
     )
+
+
+def barycentric(corners: Float64, points: Float64) -> Float64:
+    """Weights (n, 3) of the corners of triangles (n, 3, 3) at points (n, 3) in their planes."""
+    one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    way = points - corners[:, 0]
+    normal = np.cross(one, two)
+    square = np.maximum(np.einsum("nk,nk->n", normal, normal), np.finfo(float).tiny)
+    second = np.einsum("nk,nk->n", np.cross(way, two), normal) / square
+    third = np.einsum("nk,nk->n", np.cross(one, way), normal) / square
+    return np.stack([1.0 - second - third, second, third], axis=1)
 
 
 def fresnel(cosine: Float64, ior: Float64) -> Float64:

@@ -13,7 +13,7 @@ import numpy as np
 from .optics import Optics, make_optics, stopping_share
 from .scene import Float32, Float64, Int32, Scene, SceneObject
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
-from .textures import Colours, constant_colours, mean_colours, varies
+from .textures import MEAN_POINTS, Colours, constant_colours, even_points, mean_colours, varies
 
 #: A triangle smaller than this share of a full-sized one joins its neighbours in one patch.
 _SMALL = 0.3
@@ -157,7 +157,18 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     shadowless = np.concatenate(
         [np.full(len(m.triangles), not o.casts_shadow) for o, m in zip(scene.objects, split.meshes, strict=True)]
     )
-    optics = make_optics(scene, surface[solid].astype(np.int32), shadowless[solid], corners[solid], normals[solid])
+    uv = _opacity_uv(scene, split)
+    optics = make_optics(
+        scene,
+        surface[solid].astype(np.int32),
+        shadowless[solid],
+        corners[solid],
+        normals[solid],
+        None if uv is None else uv[solid],
+    )
+    filled = np.ones(count)
+    if optics is not None and uv is not None:
+        filled = np.bincount(patch, area[solid] / patch_area[patch] * _filled(optics), count).astype(np.float64)
     return Patches(
         space=space,
         corners=corners[solid],
@@ -173,8 +184,28 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
         emission=(colours.emission / np.maximum(coverage, 1e-12)[:, None]).astype(np.float32),
         transmission=(diffuse * (1.0 - front)).astype(np.float32) if (front < 1.0).any() else None,
         optics=optics,
-        coverage=None if optics is None else coverage,
+        coverage=None if optics is None else coverage * filled,
     )
+
+
+def _opacity_uv(scene: Scene, split: PatchMeshes) -> Float64 | None:
+    """(t, 3, 2) places of the split triangles' corners in their textures; None where no texture cuts holes."""
+    if all(s.opacity_texture is None for s in scene.surfaces):
+        return None
+    places = []
+    for scene_object, mesh in zip(scene.objects, split.meshes, strict=True):
+        uv = np.zeros((len(scene_object.triangles), 3, 2)) if scene_object.uv is None else scene_object.uv
+        places.append(np.einsum("tij,tjk->tik", mesh.barycentric, uv[mesh.parent]))
+    return np.concatenate(places)
+
+
+def _filled(optics: Optics) -> Float64:
+    """Mean (t,) over each triangle of what its texture leaves of the opacity; a trifle where it leaves nothing, so that
+    a ray that stops there all the same finds a patch."""
+    every = np.arange(len(optics.surface), dtype=np.int32)
+    whole = np.maximum(optics.opacity[optics.surface], 1e-12)
+    points = [np.einsum("c,tck->tk", point, optics.corners) for point in even_points(MEAN_POINTS)]
+    return np.maximum(np.mean([optics.opacity_at(every, p) for p in points], axis=0) / whole, 1e-3)
 
 
 def _mean_colours(scene: Scene, split: PatchMeshes, solid: Int64, patch: Int32, weight: Float64) -> Colours:

@@ -69,7 +69,8 @@ class Surface:
     """A material. Both sides are alike, as in Cycles.
 
     opacity: share of the light that meets the material at all, 0 to 1; the rest goes straight through, tinted by
-    `transparent`. All else is of the opaque part: shares per channel that are reflected diffusely (albedo), leave
+    `transparent`. Its texture cuts holes: it multiplies what rays find, but not what is baked, which is the light of
+    what is there. All else is of the opaque part: shares per channel that are reflected diffusely (albedo), leave
     diffusely on the other side (transmission), are mirrored (mirror), or meet clear glass (glass), which mirrors a
     little and lets the rest straight through. emission: emitted radiance per channel, W/(m^2 sr). A texture
     multiplies albedo and transmission, or emission, point by point. ior: index of
@@ -88,6 +89,7 @@ class Surface:
     glass: RGB = (0.0, 0.0, 0.0)
     ior: float = 1.0
     roughness: float = 0.0
+    opacity_texture: Texture | None = None
 
     @property
     def scattered(self) -> RGB:

@@ -97,7 +97,7 @@ class Visibility:
             triangle = hit[onward]
             before = directions[onward].astype(np.float64)
             points = optics.meet(triangle, start, before)
-            outcome, after, tints = optics.scatter(triangle, before, rng)
+            outcome, after, tints = optics.scatter(triangle, points, before, rng)
             hit[onward[outcome == ABSORBED]] = LOST
             mirrored[onward[(outcome == GLINT) | (outcome == MIRROR)]] = True
             goes = outcome < ABSORBED
@@ -143,7 +143,7 @@ class Visibility:
             onward, triangle = onward[some], self._veil[met[some]]
             from_here, way = start[some].astype(np.float64), left[some].astype(np.float64)
             points = optics.meet(triangle, from_here, way)
-            tint[onward] *= optics.passing(triangle, way)
+            tint[onward] *= optics.passing(triangle, points, way)
             normals = optics.normals[triangle]
             side = np.sign(np.einsum("nk,nk->n", way, normals))
             start = offset_along(points, normals * side[:, None])
