@@ -150,7 +150,8 @@ def leaves_that_reflect_and_transmit() -> None:
 @effect_scene("mirrors", receivers=STAGE)
 def mirror_under_the_sky() -> None:
     stage()
-    even_sky(0.5)
+    even_sky(1.0)
+    bpy.data.objects.remove(bpy.data.objects["Softbox"])
     add_mesh(
         "Mirror", screen(made_of("Silver", "ShaderNodeBsdfAnisotropic", Color=(0.9, 0.9, 0.9, 1.0), Roughness=0.0))
     )

@@ -66,22 +66,71 @@ def test_the_default_principled_differs_from_cycles_by_its_thin_reflecting_layer
     np.testing.assert_allclose(surface.albedo, under_white_sky(material), atol=0.037)
 
 
-def test_metal_and_glass_keep_their_diffuse_share_only_and_say_so(add_material):
-    material = add_material("ShaderNodeBsdfPrincipled", Base_Color=COLOUR, Metallic=0.5, Transmission_Weight=0.5)
-    material.name = "Steel"
+def test_metal_and_glass_share_what_the_base_colour_has(add_material):
+    """Half is metal; of the rest half is glass. Principled's glass is tinted by the root: light enters and leaves;
+    a metal mirrors one part in 21 more than its colour, over all angles."""
+    material = add_material(
+        "ShaderNodeBsdfPrincipled",
+        Base_Color=COLOUR,
+        Metallic=0.5,
+        Transmission_Weight=0.5,
+        Roughness=0.05,
+        IOR=1.4,
+    )
+    base = np.array(COLOUR[:3])
 
     surface, warnings = read_material(material)
 
-    np.testing.assert_allclose(surface.albedo, np.array(COLOUR[:3]) / 4, rtol=1e-6)
-    assert "Material 'Steel' is 50% metallic" in warnings[0]
-    assert "Material 'Steel' transmits 50%" in warnings[1]
+    assert warnings == []
+    np.testing.assert_allclose(surface.albedo, base / 4, rtol=1e-6)
+    np.testing.assert_allclose(surface.glass, np.sqrt(base) / 4, rtol=1e-6)
+    np.testing.assert_allclose(surface.mirror, (base + (1 - base) / 21) / 2, rtol=1e-6)
+    assert (surface.ior, surface.roughness) == (pytest.approx(1.4), pytest.approx(0.05))
 
 
-def test_transparency_is_named(add_material):
-    _, warnings = read_material(add_material("ShaderNodeBsdfPrincipled", Alpha=0.5))
+def test_alpha_is_opacity_and_leaves_the_colour_of_what_is_there(add_material):
+    surface, warnings = read_material(add_material("ShaderNodeBsdfPrincipled", Base_Color=COLOUR, Alpha=0.25))
+
+    assert warnings == []
+    assert surface.opacity == 0.25
+    np.testing.assert_allclose(surface.scattered, np.array(COLOUR[:3]) / 4, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"), [("Translucent", "transmission"), ("Glass", "glass"), ("Refraction", "glass")]
+)
+def test_shaders_that_pass_light_on_are_read(add_material, kind, field):
+    surface, warnings = read_material(add_material(f"ShaderNodeBsdf{kind}", Color=COLOUR))
+
+    assert warnings == []
+    np.testing.assert_allclose(getattr(surface, field), COLOUR[:3], rtol=1e-6)
+    assert max(surface.albedo) == 0
+
+
+def test_frosted_glass_is_named(add_material):
+    _, warnings = read_material(add_material("ShaderNodeBsdfGlass", Roughness=0.5))
 
     assert len(warnings) == 1
-    assert "Alpha" in warnings[0]
+    assert "glass of roughness 0.50" in warnings[0]
+
+
+def test_a_mix_with_a_transparent_shader_is_opaque_by_the_other_share(add_material, shader):
+    """The other shader's light is that of the opaque part."""
+    material = add_material("ShaderNodeBsdfDiffuse")
+    mix = shader(material, "ShaderNodeMixShader")
+    mix.inputs[0].default_value = 0.25
+    film, solid = chain(material, "ShaderNodeBsdfTransparent", "ShaderNodeBsdfDiffuse")
+    film.inputs["Color"].default_value = (1.0, 0.5, 0.25, 1.0)
+    solid.inputs["Color"].default_value = COLOUR
+    material.node_tree.links.new(film.outputs[0], mix.inputs[1])
+    material.node_tree.links.new(solid.outputs[0], mix.inputs[2])
+
+    surface, warnings = read_material(material)
+
+    assert warnings == []
+    assert surface.opacity == 0.25
+    assert surface.transparent == (1.0, 0.5, 0.25)
+    np.testing.assert_allclose(surface.albedo, COLOUR[:3], rtol=1e-6)
 
 
 def chain(material, *kinds):
@@ -167,11 +216,11 @@ def test_a_texture_is_named_and_the_plain_value_taken(add_material):
     assert "Material 'Bricks' takes its Color from the node Checker Texture" in warnings[0]
 
 
-def test_what_has_no_diffuse_part_is_black_and_named(add_material):
-    surface, warnings = read_material(add_material("ShaderNodeBsdfGlass", name="Window"))
+def test_a_shader_that_is_not_read_is_black_and_named(add_material):
+    surface, warnings = read_material(add_material("ShaderNodeBsdfToon", name="Cartoon"))
 
     assert surface.albedo == (0.0, 0.0, 0.0)
-    assert "Material 'Window' uses the node Glass BSDF" in warnings[0]
+    assert "Material 'Cartoon' uses the node Toon BSDF" in warnings[0]
 
 
 def test_no_shader_at_the_output_is_black_and_named(add_material):

@@ -380,8 +380,8 @@ def test_the_sky_is_light_too(add_mesh, lamp, shader):
 
 
 def test_instances_share_one_conversion_and_warn_once(add_mesh, add_material):
-    obj = add_mesh("One", visible_shadow=False)
-    obj.data.materials.append(add_material("ShaderNodeBsdfGlass", name="Glass"))
+    obj = add_mesh("One", visible_diffuse=False)
+    obj.data.materials.append(add_material("ShaderNodeBsdfGlass", name="Glass", Roughness=0.5))
     for index in range(3):
         twin = bpy.data.objects.new(f"Twin {index}", obj.data)
         twin.location.x = index + 2.0
