@@ -13,10 +13,12 @@ import numpy as np
 from .optics import Optics, make_optics, stopping_share
 from .scene import Float32, Float64, Int32, Scene, SceneObject
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
-from .textures import MEAN_POINTS, Colours, constant_colours, even_points, mean_colours, varies
+from .textures import Colours, constant_colours, even_points, mean_colours, varies
 
 #: A triangle smaller than this share of a full-sized one joins its neighbours in one patch.
 _SMALL = 0.3
+#: Points of a triangle that tell how much of it a texture cuts away.
+_HOLE_POINTS = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -204,7 +206,7 @@ def _filled(optics: Optics) -> Float64:
     a ray that stops there all the same finds a patch."""
     every = np.arange(len(optics.surface), dtype=np.int32)
     whole = np.maximum(optics.opacity[optics.surface], 1e-12)
-    points = [np.einsum("c,tck->tk", point, optics.corners) for point in even_points(MEAN_POINTS)]
+    points = [np.einsum("c,tck->tk", point, optics.corners) for point in even_points(_HOLE_POINTS)]
     return np.maximum(np.mean([optics.opacity_at(every, p) for p in points], axis=0) / whole, 1e-3)
 
 
