@@ -70,7 +70,7 @@ def _check_surface(surface: Surface, warnings: list[str]) -> Surface:
     total = shares.sum(axis=0)
     if total.max() <= ALBEDO_LIMIT and values[-4:].max() <= 1.0:
         return surface
-    if total.max() > ALBEDO_LIMIT and not shares[2:].any():
+    if total.max() > ALBEDO_LIMIT and not shares[2:].any() and surface.albedo_texture is None:
         warnings.append(
             f"Material '{surface.name}' reflects all light or more; {ALBEDO_LIMIT:.2%} is used. Nothing real is whiter "
             "than fresh snow at 90 %: pick a darker colour."

@@ -128,7 +128,9 @@ def test_patches_have_the_mean_of_their_texture(sheet, build):
 def test_a_ramp_shows_exactly(sheet):
     """Linear in space under an even sky: no fit, no sampling and no vertex density can excuse an error."""
     ramp = replace(grey([np.arange(256) / 256 + 1 / 512]), extension="extend")
-    baked = bake(sheet(ramp), QUICK).objects[0]
+    result = bake(sheet(ramp), QUICK)
+    baked = result.objects[0]
+    assert not any("reflects all light" in warning for warning in result.report.warnings)
     shown = baked.layers["combined"][..., 0]
     x = baked.vertices[baked.triangles][..., 0]
     np.testing.assert_allclose(shown, x, atol=2e-3)
