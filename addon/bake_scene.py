@@ -10,6 +10,7 @@ from time import perf_counter
 import bpy
 
 from ..core.bake import bake
+from ..core.memory import Memory
 from ..core.plan import Effort
 from ..core.progress import Progress
 from ..core.result import BakeResult
@@ -28,18 +29,19 @@ def bake_objects(
     attribute: str,
     progress: Progress | None = None,
     effort: Effort | None = None,
+    memory: Memory | None = None,
 ) -> tuple[BakeResult, list[bpy.types.Object]]:
     """Bake the objects and return the result and the objects that carry it now.
 
-    settings.tessellate must be False for the result `keep`; effort is that of core.bake. The seconds for reading and
-    writing join the report.
+    settings.tessellate must be False for the result `keep`; effort and memory are those of core.bake. The seconds for
+    reading and writing join the report.
     Raises SceneError for what cannot be baked or written, Cancelled when stopped; nothing is changed then.
     """
     check_writable(objects, settings.layers, result_mode=result_mode, attribute=attribute)
     begun = perf_counter()
     scene, sources = read_scene(context.evaluated_depsgraph_get(), objects, tessellate=settings.tessellate)
     read = perf_counter()
-    result = bake(scene, settings, progress, effort)
+    result = bake(scene, settings, progress, effort, memory=memory)
     baked = perf_counter()
     written = write(context, result, sources, result_mode=result_mode, attribute=attribute)
     done = perf_counter()
@@ -74,6 +76,7 @@ def bake_frames(
             attribute=frame_attribute(attribute, frames[0]),
             progress=progress,
         )
+        memory = Memory()
         with _as_originals(written):
             for frame in frames[1:]:
                 scene.frame_set(frame)
@@ -84,6 +87,7 @@ def bake_frames(
                     result_mode="keep",
                     attribute=frame_attribute(attribute, frame),
                     progress=progress,
+                    memory=memory,
                 )
                 first.report.objects += result.report.objects
                 for stage, seconds in result.report.seconds.items():

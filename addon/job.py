@@ -12,6 +12,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from ..core import bake as pipeline
+from ..core.memory import Memory
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import Scene, SceneError
@@ -26,6 +27,9 @@ class BakeJob:
 
     running: ClassVar[BakeJob | None] = None
     """The bake that is under way in this Blender, if any."""
+
+    memory: ClassVar[Memory] = Memory()
+    """The last bake, for the next one to build upon: a lamp that is dimmed takes no bake from the start."""
 
     _leaving: ClassVar[list[threading.Thread]] = []
 
@@ -50,7 +54,7 @@ class BakeJob:
 
     def _work(self, scene: Scene, settings: Settings) -> None:
         try:
-            self._outcome = pipeline.bake(scene, settings, self.progress)
+            self._outcome = pipeline.bake(scene, settings, self.progress, memory=BakeJob.memory)
         except BaseException as problem:  # noqa: BLE001 - kept whole, and raised again by `result` in the main thread
             self._outcome = problem
 

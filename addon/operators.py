@@ -310,9 +310,10 @@ def _end_bake(*_: object) -> None:
 
 @persistent
 def _clear_desk(*_: object) -> None:
-    """Another file is about to be loaded, or the add-on to be disabled: no thread may outlive that."""
+    """Another file is about to be loaded, or the add-on to be disabled: no thread and no memory may outlive that."""
     _end_bake()
     BakeJob.wait_for_leaving()
+    BakeJob.memory.forget()
 
 
 OPERATORS = (

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from .accuracy import ErrorEstimate
 from .baked import Baked
 from .clock import Clock
 from .direct.illumination import DirectLight
@@ -53,6 +54,9 @@ class Memory:
     def remember(self, scene: Scene, settings: Settings, baked: Baked, light: Light) -> None:
         self._last = _Last(scene, settings, baked, light)
 
+    def forget(self) -> None:
+        self._last = None
+
     def recall(self, scene: Scene, settings: Settings, clock: Clock) -> BakeResult | None:
         """The result for a scene that differs from the last one by the brightness of lamps only, or for one that is the
         same and is to be baked better; None when there is nothing to build upon.
@@ -66,7 +70,7 @@ class Memory:
         if changes is None or not changes.keys() <= {lamp.name for lamp in last.baked.plan.scene.lamps}:
             return None
         better = (settings.error, settings.seconds) != (last.settings.error, last.settings.seconds)
-        if changes and better:
+        if better and (changes or not _sampling_would_help(last.light.error)):
             return None
         survey = last.baked.survey
         rays = Counter({purpose: -count for purpose, count in survey.rays.items()})
@@ -122,6 +126,11 @@ def _same_question(before: Settings, after: Settings) -> bool:
 
 def _same_but_lamps(before: Scene, after: Scene) -> bool:
     return same(*(replace(scene, lamps=(), warnings=()) for scene in (before, after)))
+
+
+def _sampling_would_help(error: ErrorEstimate) -> bool:
+    """Whether sampling is most of the error: other triangles and patches take another bake."""
+    return error.sampling > float(np.hypot(error.transport, error.resolution))
 
 
 def _color(lamp: Lamp) -> Float64:

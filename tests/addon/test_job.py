@@ -29,7 +29,7 @@ def start(monkeypatch):
         each.stop()
 
 
-def bake_until_cancelled(_scene, _settings, progress):
+def bake_until_cancelled(_scene, _settings, progress, **_):
     while True:
         progress.report("wait", 0.5, 0.1)
 
@@ -40,7 +40,7 @@ def threads():
 
 def test_result_is_what_the_bake_returned(start):
     expected = BakeResult((), Report())
-    job = start(lambda *_: expected)
+    job = start(lambda *_, **__: expected)
     assert job.result() is expected
     assert job.poll()
     assert not threads()
@@ -49,7 +49,7 @@ def test_result_is_what_the_bake_returned(start):
 
 def test_bakes_beside_the_main_thread(start):
     where = []
-    start(lambda *_: where.append(threading.current_thread()) or BakeResult((), Report())).result()
+    start(lambda *_, **__: where.append(threading.current_thread()) or BakeResult((), Report())).result()
     assert where[0] is not threading.main_thread()
 
 
@@ -66,7 +66,7 @@ def test_cancel_ends_the_thread(start):
 
 def test_who_cancels_need_not_wait(start):
     go_on = threading.Event()
-    job = start(lambda *_: go_on.wait() and BakeResult((), Report()))
+    job = start(lambda *_, **__: go_on.wait() and BakeResult((), Report()))
     job.cancel()
     assert job.poll()
     with pytest.raises(Cancelled):
@@ -82,7 +82,7 @@ def test_kept_light_is_that_of_the_last_complete_pass(monkeypatch):
     passes = [BakeResult((), Report(patches=number)) for number in range(3)]
     at_work = threading.Event()
 
-    def bake(_scene, _settings, progress):
+    def bake(_scene, _settings, progress, **_):
         for each in passes:
             progress.show(lambda each=each: each)
         at_work.set()
@@ -109,7 +109,7 @@ def test_nothing_to_keep_does_not_stop_the_bake(start):
 
 def test_a_result_that_comes_after_the_cancel_is_dropped(start):
     go_on = threading.Event()
-    job = start(lambda *_: go_on.wait() and BakeResult((), Report()))
+    job = start(lambda *_, **__: go_on.wait() and BakeResult((), Report()))
     job.cancel()
     go_on.set()
     with pytest.raises(Cancelled):
@@ -118,7 +118,7 @@ def test_a_result_that_comes_after_the_cancel_is_dropped(start):
 
 @pytest.mark.parametrize("problem", [SceneError("'Cube' is bad: mend it."), MemoryError("too many patches")])
 def test_what_the_bake_raises_arrives_in_the_main_thread(start, problem):
-    def bake(*_):
+    def bake(*_, **__):
         raise problem
 
     with pytest.raises(type(problem)) as caught:
@@ -133,7 +133,7 @@ def test_one_bake_at_a_time(start):
         start(bake_until_cancelled)
     job.stop()
     assert not threads()
-    start(lambda *_: BakeResult((), Report())).result()
+    start(lambda *_, **__: BakeResult((), Report())).result()
 
 
 def test_time_left_follows_the_progress(start):

@@ -31,7 +31,7 @@ def stand_in(monkeypatch, bake_positions):
     """The core's place is taken by a bake that paints positions, or by what a test wants to happen."""
 
     def put(happen=None):
-        def bake(scene, settings, progress=None, _effort=None):
+        def bake(scene, settings, progress=None, _effort=None, **_):
             if happen is not None:
                 happen(progress)
             result = bake_positions(scene, layers=settings.layers)

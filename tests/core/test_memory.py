@@ -7,6 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from radiosity_baker.core import memory as memory_module
+from radiosity_baker.core.accuracy import ErrorEstimate
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.memory import Memory, lamp_changes, same
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene
@@ -77,13 +79,19 @@ def test_what_a_lamp_brings_is_in_proportion_to_it(room):
     assert three - one == pytest.approx(2 * (two - one), abs=1e-5 * one.max())
 
 
-def test_a_smaller_error_goes_on_where_the_bake_stood(room):
+def test_a_smaller_error_goes_on_where_the_bake_stood(room, monkeypatch):
+    monkeypatch.setattr(memory_module, "_sampling_would_help", lambda _: True)
     memory = Memory()
     first = bake(room, SETTINGS, memory=memory)
     better = bake(room, replace(SETTINGS, error=0.03), memory=memory)
     assert better.report.estimated_error["sampling"] < first.report.estimated_error["sampling"]
     assert "transport" not in better.report.rays
     assert [len(o.triangles) for o in better.objects] == [len(o.triangles) for o in first.objects]
+
+
+@pytest.mark.parametrize(("sampling", "resolution", "helps"), [(0.02, 0.01, True), (0.02, 0.03, False)])
+def test_more_samples_help_where_they_are_most_of_the_error(sampling, resolution, helps):
+    assert memory_module._sampling_would_help(ErrorEstimate(sampling, 0.001, resolution)) is helps
 
 
 @pytest.mark.parametrize(
