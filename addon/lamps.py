@@ -12,7 +12,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..core.scene import RGB, AreaLamp, Float64, Lamp, PointLamp, SpotLamp, SunLamp, Vector
+from ..core.scene import RGB, AreaLamp, Float64, Lamp, PointLamp, Portal, SpotLamp, SunLamp, Vector
 from .compat import casts_shadow, lamp_strength
 from .materials import read_lamp_nodes
 
@@ -42,6 +42,19 @@ def read_lamp(name: str, lamp: bpy.types.Light, matrix: Float64) -> tuple[Lamp |
         return None, warnings
     read = READERS[lamp.type](name, lamp, matrix, strength, warnings)
     return read and replace(read, casts_shadow=casts_shadow(lamp)), warnings
+
+
+def read_portal(name: str, lamp: bpy.types.Light, matrix: Float64) -> Portal | None:
+    """An area lamp that is a portal: it gives no light, but tells where the sky shines in. None for any other lamp.
+
+    A round one stands for the rectangle around it, and one without area for none.
+    """
+    if lamp.type != "AREA" or not getattr(getattr(lamp, "cycles", None), "is_portal", False):
+        return None
+    lamp_like = _area(name, lamp, matrix, np.ones(3), [])
+    if lamp_like is None:
+        return None
+    return Portal(name, lamp_like.center, lamp_like.half_u, lamp_like.half_v, lamp_like.normal)
 
 
 def warn_of_linking(name: str, obj: bpy.types.Object) -> list[str]:

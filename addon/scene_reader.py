@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Scene, SceneError, SceneObject, SkyMap, Surface
+from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Portal, Scene, SceneError, SceneObject, SkyMap, Surface
 from .copies import copies_of, original_of, place_of
 from .corner_values import corner_colors, corner_uv
-from .lamps import read_lamp, warn_of_linking
+from .lamps import read_lamp, read_portal, warn_of_linking
 from .material_samples import MaterialSamples, Sampled
 from .materials import DEFAULT_SURFACE, MaterialSurface, read_material
 from .receiver_source import ReceiverSource
@@ -79,6 +79,7 @@ def read_scene(
         surfaces=tuple(reading.surfaces.all),
         lamps=(*reading.lamps, *world.suns),
         sky=world.sky,
+        portals=tuple(reading.portals),
         warnings=tuple(dict.fromkeys([*reading.warnings, *reading.surfaces.warnings, *world.warnings])),
     )
     _check_receivers(receivers, reading.sources)
@@ -126,6 +127,7 @@ class _Reading:
         self.objects: list[SceneObject] = []
         self.sources: list[ReceiverSource] = []
         self.lamps: list[Lamp] = []
+        self.portals: list[Portal] = []
         self.surfaces = _SurfaceTable()
         self.warnings: list[str] = []
         self._meshes: dict[int, _LocalMesh] = {}
@@ -144,6 +146,8 @@ class _Reading:
                 lamp, warnings = read_lamp(name, obj.data, matrix)
                 self.warnings += warnings + warn_of_linking(name, obj)
                 self.lamps += [lamp] if lamp is not None else []
+                portal = read_portal(name, obj.data, matrix)
+                self.portals += [portal] if portal is not None else []
 
     def _place(self, instance: bpy.types.DepsgraphObjectInstance) -> Float64:
         copy = None if instance.is_instance else self.copies.get(instance.object.original)

@@ -12,7 +12,7 @@ from .clock import Clock
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
 from .direct.lamps import place
-from .direct.sky import split_bright
+from .direct.sky import divide_sky
 from .memory import Memory
 from .parallel import Workers
 from .patch_refinement import patches_by_light
@@ -22,9 +22,8 @@ from .progress import Progress
 from .receivers import Receivers, make_receivers
 from .refinement import Light, average_light, refine
 from .result import BakeResult
-from .scene import Scene, SkyMap
+from .scene import Scene
 from .settings import Settings
-from .sky import Sky
 from .survey import Surroundings, Survey, look_up
 from .transport import solve_halves
 from .visibility import Visibility
@@ -52,9 +51,6 @@ def bake(
         planned = plan(check_scene(scene), settings, effort)
     scene = planned.scene
     effort = planned.effort
-    apart = isinstance(scene.sky, SkyMap) and planned.active("sky lights")
-    smooth, suns = split_bright(scene.sky) if apart else (scene.sky, ())
-    sky = Sky.of(smooth)
     clock.progress.expected = planned.seconds
 
     def show(baked: Baked, light: Light) -> None:
@@ -65,7 +61,9 @@ def bake(
             space, around = unit_space(scene), scene.surroundings()
             start = max(int(effort.triangles / effort.coarsest), 1)
             receivers = make_receivers(scene, space, settings, start)
-            lights = [place(lamp, space) for lamp in (*scene.lamps, *suns)] + emitting_panels(around, space)
+            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
+            sky, of_sky = divide_sky(scene, space, suns=planned.active("sky lights"), portals=planned.active("portals"))
+            lights += of_sky
             if clock.progress.watched:
                 show(*first_light(planned, around, receivers, lights, settings, workers))
             patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)

@@ -29,6 +29,9 @@ MOST_PANELS, LARGE_PART = 64, 0.1
 #: Each kind of lamp, by the name of its effect.
 LAMPS: dict[str, type] = {"point lamps": PointLamp, "spot lamps": SpotLamp, "sun": SunLamp, "area lamps": AreaLamp}
 
+#: What is sampled as a light is not told from lamps afterwards.
+_WHOLE_SKY = "the layer Sky is asked for, and holds what rays find"
+
 
 @dataclass(frozen=True)
 class Rule:
@@ -112,14 +115,26 @@ def sky_map(scene: Scene, _: Settings) -> Effect:
     return Effect("sky map", False, "the world is the same in all directions")
 
 
-def sky_lights(scene: Scene, _: Settings) -> Effect:
+def sky_lights(scene: Scene, settings: Settings) -> Effect:
     if not isinstance(scene.sky, SkyMap):
         return Effect("sky lights", False, "the world is the same in all directions")
+    if "sky" in settings.layers:
+        return Effect("sky lights", False, _WHOLE_SKY)
     count = len(split_bright(scene.sky)[1])
     if not count:
         return Effect("sky lights", False, "nothing in the sky is much brighter than the rest of it")
     what = "a bright spot is" if count == 1 else f"{count} bright spots are"
     return Effect("sky lights", True, f"{what} sampled as {'a sun' if count == 1 else 'suns'}")
+
+
+def portals(scene: Scene, settings: Settings) -> Effect:
+    if not scene.portals:
+        return Effect("portals", False, "no area lamp is a portal")
+    if not sky(scene, settings).active:
+        return Effect("portals", False, "the world is black")
+    if "sky" in settings.layers:
+        return Effect("portals", False, _WHOLE_SKY)
+    return Effect("portals", True, f"the sky shines through {_names([portal.name for portal in scene.portals])}")
 
 
 def bounces(scene: Scene, settings: Settings) -> Effect:
@@ -311,6 +326,10 @@ def _without_share(name: str) -> Callable[[Scene], Scene]:
     return lambda scene: _with_surfaces(scene, **{name: (0.0, 0.0, 0.0)})
 
 
+def _without_portals(scene: Scene) -> Scene:
+    return replace(scene, portals=())
+
+
 def _with_even_sky(scene: Scene) -> Scene:
     """The mean of the map in all directions."""
     if not isinstance(scene.sky, SkyMap):
@@ -335,6 +354,7 @@ EFFECTS: dict[str, Rule] = {
     "sky": Rule(sky, _without_sky),
     "sky map": Rule(sky_map, _with_even_sky),
     "sky lights": Rule(sky_lights, _unchanged),
+    "portals": Rule(portals, _without_portals),
     "transparency": Rule(transparency, _opaque),
     "diffuse transmission": Rule(diffuse_transmission, _without_share("transmission")),
     "mirrors": Rule(mirrors, _without_share("mirror")),

@@ -97,7 +97,12 @@ class Hemispheres:
         code = path.hit.copy()
         code[self._from_behind(path.hit, path.directions)] += self.codes.triangles
         left = np.flatnonzero(path.hit < 0)
-        code[left] = self.codes.escaped + self.sky.texel(path.directions[left])
+        texel = self.sky.texel(path.directions[left])
+        if self.sky.portals:
+            straight = np.einsum("nk,nk->n", path.directions[left], directions[left]) > np.float32(1 - 1e-5)
+            first = left[straight]
+            texel[straight] = self.sky.beside_portals(texel[straight], origins[first], directions[first])
+        code[left] = self.codes.escaped + texel
         if path.onward:
             code[path.hit == LOST] = self.codes.lost
         code = code.reshape(count, self.rays)

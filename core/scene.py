@@ -228,6 +228,21 @@ class SkyMap:
 Lamp = PointLamp | SpotLamp | SunLamp | AreaLamp
 
 
+@dataclass(frozen=True)
+class Portal:
+    """A rectangle in a window, through which the sky shines into a room: it gives no light, but tells where to look.
+
+    half_u, half_v: from the centre to the middle of two neighbouring sides, at right angles. normal: unit vector at
+    right angles to both, into the room.
+    """
+
+    name: str
+    center: Vector
+    half_u: Vector
+    half_v: Vector
+    normal: Vector
+
+
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything a bake needs. sky: radiance from every direction that no surface covers, W/(m^2 sr)."""
@@ -237,6 +252,7 @@ class Scene:
     lamps: tuple[Lamp, ...] = ()
     sky: RGB | SkyMap = (0.0, 0.0, 0.0)
     warnings: tuple[str, ...] = field(default=())
+    portals: tuple[Portal, ...] = ()
 
     def surroundings(self) -> Scene:
         """The scene as light meets it: without the objects that only receive. Raises SceneError when that is all."""

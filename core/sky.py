@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .scene import RGB, Float32, Float64, Int32, SkyMap
+from .patches import Space
+from .scene import RGB, Bool, Float32, Float64, Int32, Portal, SkyMap
 
 #: Texels of a sky that is not even. All have the same solid angle, 0.0015 sr, about (2.2 degrees)^2.
 _ROWS, _COLUMNS = 64, 128
@@ -18,13 +19,15 @@ class Sky:
 
     light (rows * columns, k) float32: what a ray that leaves through each texel brings. A black sky has k = 0, an even
     one k = 1, for then rays need only be counted, and any other one the three channels. irradiance (k, 3): turns the
-    mean of that over cosine-distributed rays into W/m^2.
+    mean of that over cosine-distributed rays into W/m^2. portals: what leaves through these brings nothing, for
+    they are sampled as lights; it has a texel of its own, the last.
     """
 
     rows: int
     columns: int
     light: Float32
     irradiance: Float64
+    portals: tuple[Rectangle, ...] = ()
 
     @staticmethod
     def of(sky: RGB | SkyMap) -> Sky:
@@ -40,15 +43,55 @@ class Sky:
             return self
         return Sky(self.rows, self.columns, (self.light * self.irradiance).astype(np.float32), np.eye(3))
 
+    def without(self, portals: list[Rectangle]) -> Sky:
+        """The sky that shines elsewhere than through the portals."""
+        dark = np.zeros_like(self.light[:1])
+        return replace(self, light=np.concatenate([self.light, dark]), portals=tuple(portals)) if portals else self
+
     def texel(self, directions: Float32) -> Int32:
         """Number of the texel (n,) that each unit vector (n, 3) points to."""
-        if len(self.light) == 1:
+        if self.rows * self.columns == 1:
             return np.zeros(len(directions), dtype=np.int32)
         x, y, z = directions.T
         row = (z + 1) * np.float32(self.rows / 2)
         column = (np.float32(0.5) - np.arctan2(y, x) * np.float32(0.5 / np.pi)) * np.float32(self.columns)
         row = np.clip(row.astype(np.int32), 0, self.rows - 1)
         return row * np.int32(self.columns) + np.minimum(column.astype(np.int32), self.columns - 1)
+
+    def beside_portals(self, texel: Int32, origins: Float32, directions: Float32) -> Int32:
+        """Texels (n,) of straight rays, with the dark one for those that leave through a portal."""
+        through = np.zeros(len(texel), dtype=bool)
+        for portal in self.portals:
+            through |= portal.crossed(origins, directions)
+        return np.where(through, np.int32(len(self.light) - 1), texel)
+
+
+@dataclass(frozen=True, eq=False)
+class Rectangle:
+    """A portal in the unit box: center, half_u, half_v, normal (3,)."""
+
+    center: Float64
+    half_u: Float64
+    half_v: Float64
+    normal: Float64
+
+    @staticmethod
+    def of(portal: Portal, space: Space) -> Rectangle:
+        half_u, half_v = np.array(portal.half_u) / space.metres, np.array(portal.half_v) / space.metres
+        return Rectangle(space.normalise(np.array(portal.center)), half_u, half_v, np.array(portal.normal))
+
+    def crossed(self, origins: Float32, directions: Float32) -> Bool:
+        """Which rays (n, 3) cross it from the room outward."""
+        away = origins - self.center.astype(np.float32)
+        normal = self.normal.astype(np.float32)
+        height, fall = away @ normal, -(directions @ normal)
+        ahead = np.flatnonzero((height > 0) & (fall > 0))
+        inside = np.zeros(len(origins), dtype=bool)
+        place = away[ahead] + directions[ahead] * (height[ahead] / fall[ahead])[:, None]
+        inside[ahead] = True
+        for half in (self.half_u, self.half_v):
+            inside[ahead] &= np.abs(place @ (half / (half @ half)).astype(np.float32)) <= 1
+        return inside
 
 
 def equal_texels(sky: SkyMap, rows: int, columns: int) -> Float64:

@@ -182,8 +182,9 @@ class DirectLight:
         towards = ways.towards
         weights = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
         gains = light.gain(ways)
-        brings = weights if gains is None else weights * gains
-        free = brings == 0
+        # One plane, or one for each channel.
+        brings = (weights if gains is None else weights * gains).reshape(-1, *weights.shape)
+        free = brings.max(axis=0) == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
         above = (towards * normals[:, None]).sum(axis=0) > 0
         if not light.casts_shadow:
@@ -192,7 +193,7 @@ class DirectLight:
         unblocked, tint, rays = self._trace(receivers, towards, sample, point)
         free[sample, point] = unblocked
         if tint is None:
-            return _Look(weights, (brings * free)[None], free[None], free, free, rays)
+            return _Look(weights, brings * free, free[None], free, free, rays)
         passed = np.tile(free, (3, 1, 1)).astype(np.float32)
         passed[:, sample, point] = tint
         return _Look(weights, brings * passed, passed, free, (passed == 1).all(axis=0), rays)

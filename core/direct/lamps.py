@@ -3,7 +3,8 @@
 Every lamp answers three questions, for points in the unit box:
 - `share(points, normals)`: how much of its light arrives, (n,), as if it shone evenly: irradiance = share * colour;
 - `aim(points, unit)`: ways from the points to places spread over the lamp, and how much of its sky each stands for;
-- `gain(ways)`: how much of an even lamp's light it really sends along these ways, or None for all of it.
+- `gain(ways)`: how much of an even lamp's light it really sends along these ways, (r, n) or by channel (3, r, n), or
+  None for all of it.
 The mean over all ways of cos(receiver, way) * solid is the share, where nothing is in the way. The arrays of ways have
 components and samples first, (3, r, n), in single precision: numpy then runs along the points.
 """
@@ -27,7 +28,7 @@ Real = TypeVar("Real", np.float32, np.float64)
 #: An ellipse is the polygon of this many corners and of the same area; its irradiance is off by less than 1e-3.
 _ELLIPSE_CORNERS = 32
 #: How far away the targets of a sun are, in half extents of the scene: beyond every occluder.
-_BEYOND = np.float32(8)
+BEYOND = np.float32(8)
 #: Nearer than this many diameters, places on a flat lamp are spread over its solid angle, farther over its area.
 _NEAR = 0.75
 #: Solid angles below this cancel; they belong to lamps that are seen edge-on.
@@ -196,15 +197,15 @@ class Sun:
 
     def aim(self, points: Float32, unit: Float32) -> Ways:
         axis = self.axis.astype(np.float32)[:, None]
-        depth = np.full((1, points.shape[1]), _BEYOND, dtype=np.float32)
+        depth = np.full((1, points.shape[1]), BEYOND, dtype=np.float32)
         if not self.sized:
-            towards = np.broadcast_to(_BEYOND * axis[:, None], (3, 1, points.shape[1]))
-            return _spread(towards, depth, float(_BEYOND) ** 2)
+            towards = np.broadcast_to(BEYOND * axis[:, None], (3, 1, points.shape[1]))
+            return _spread(towards, depth, float(BEYOND) ** 2)
         first, second = frame(axis)
         x, y = disc(unit)
-        reach = np.float32(_BEYOND * self.tangent)
-        towards = _BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None])
-        return _spread(towards, depth, float(_BEYOND) ** 2 * (1 + self.tangent**2))
+        reach = np.float32(BEYOND * self.tangent)
+        towards = BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None])
+        return _spread(towards, depth, float(BEYOND) ** 2 * (1 + self.tangent**2))
 
     def gain(self, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None

@@ -1,8 +1,10 @@
-"""Bright parts of a sky as suns: what is small and bright random rays find too seldom, so it is sampled as lights.
+"""The sky as lights: its bright parts as suns, and portals.
 
-The sky is cut at a radiance. What is below stays in the map, where rays find it with little noise; what is above
-becomes discs. Each has the energy, the mean direction and the spread of the part that it stands for, so a receiver that
-sees all of a part gets from its disc exactly what it gets from the part.
+What is small and bright random rays find too seldom, so it is sampled as lights. The sky is cut at a radiance. What is
+below stays in the map, where rays find it with little noise; what is above becomes discs. Each has the energy, the mean
+direction and the spread of the part that it stands for, so a receiver that sees all of a part gets from its disc what
+it gets from the part. A portal is an area lamp with the sky's radiance, and rays that leave through it bring
+nothing.
 """
 
 from __future__ import annotations
@@ -11,12 +13,52 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..scene import Float64, SkyMap, SunLamp
+from ..patches import Space
+from ..scene import Float32, Float64, Scene, SkyMap, SunLamp
+from ..sky import Rectangle, Sky
+from .lamps import BEYOND, Light, Panel, Ways, place
 
 #: The sky is cut at so many times the mean of what is left of it.
 _CONTRAST = 6.0
 #: Discs at most; and where discs of so many degrees across stand for parts well enough, there are fewer.
 _MOST_DISCS, _DEGREES = 12, 8.0
+
+
+def divide_sky(scene: Scene, space: Space, *, suns: bool, portals: bool) -> tuple[Sky, list[Light]]:
+    """The sky that rays find, and the lights for the rest of it: its bright parts, and what portals let in."""
+    smooth, bright = split_bright(scene.sky) if suns and isinstance(scene.sky, SkyMap) else (scene.sky, ())
+    sky = Sky.of(smooth)
+    shining = scene.portals if portals and sky.light.any() else ()
+    rectangles = [Rectangle.of(portal, space) for portal in shining]
+    windows = [Window(portal.name, rectangle, sky) for portal, rectangle in zip(shining, rectangles, strict=True)]
+    return sky.without(rectangles), [*(place(sun, space) for sun in bright), *windows]
+
+
+class Window(Panel):
+    """The sky behind a portal, as an area lamp: it shines from the rectangle, but its shadow rays go on to the sky."""
+
+    def __init__(self, name: str, portal: Rectangle, sky: Sky) -> None:
+        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+        if np.cross(portal.half_u, portal.half_v) @ portal.normal < 0:
+            outline = outline[::-1]
+        corners = portal.center + outline @ np.stack([portal.half_u, portal.half_v])
+        super().__init__(name, corners, np.zeros(3), two_sided=False)
+        self._sky = sky
+        self._even = sky.light.shape[1] == 1
+        self.color = sky.irradiance[0] if self._even else sky.light.mean(axis=0).astype(np.float64)
+
+    def aim(self, points: Float32, unit: Float32) -> Ways:
+        ways = super().aim(points, unit)
+        stretch = BEYOND * ways.inverse
+        return Ways(ways.towards * stretch, ways.inverse / np.maximum(stretch, np.float32(1e-30)), ways.solid)
+
+    def gain(self, ways: Ways) -> Float32 | None:
+        """The sky's radiance along the ways relative to its mean, channel by channel (3, r, n)."""
+        if self._even:
+            return None
+        directions = (ways.towards * ways.inverse).reshape(3, -1).T
+        light = self._sky.light[self._sky.texel(directions)].T.reshape(ways.towards.shape)
+        return light / np.maximum(self.color, 1e-30).astype(np.float32)[:, None, None]
 
 
 @lru_cache(maxsize=2)

@@ -13,6 +13,7 @@ from radiosity_baker.core.effects import EFFECTS, choose_effects
 from radiosity_baker.core.scene import (
     AreaLamp,
     PointLamp,
+    Portal,
     Scene,
     SceneError,
     SkyMap,
@@ -23,6 +24,8 @@ from radiosity_baker.core.scene import (
 )
 from radiosity_baker.core.settings import Settings
 
+#: Looks down from below, so that it shines on nothing and no cell is split for it.
+PORTAL = Portal("window", (0, 0, -5), (0.3, 0, 0), (0, 0.3, 0), (0, 0, -1))
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 COLOR = (1.0, 1.0, 1.0)
 LAMP = PointLamp("bulb", (0.2, 0.1, 1), COLOR)
@@ -49,7 +52,9 @@ def everything(build) -> Scene:
         Surface("veil", quarter, opacity=0.5, transmission=quarter, mirror=quarter, glass=quarter),
     )
     uv = np.array([[(0, 0), (1, 0), (1, 1)], [(0, 0), (1, 1), (0, 1)]], dtype=np.float32)
-    return Scene((replace(floor, uv=uv), replace(glow, uv=uv), veil), surfaces, lamps, sky=sky_with_a_spot())
+    return Scene(
+        (replace(floor, uv=uv), replace(glow, uv=uv), veil), surfaces, lamps, sky=sky_with_a_spot(), portals=(PORTAL,)
+    )
 
 
 def sky_with_a_spot() -> SkyMap:

@@ -1,0 +1,79 @@
+"""Portals: the same light as without, from a sky of any kind, and far less noise in a room with a small window."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.patches import Space
+from radiosity_baker.core.scene import Portal, Scene, SkyMap, Surface
+from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.sky import Rectangle
+
+BLACK, WHITE = Surface("black", (0.0, 0.0, 0.0)), Surface("white", (0.5, 0.5, 0.5))
+WINDOW = Portal("window", (2.0, 0.0, 1.0), (0.0, 0.4, 0.0), (0.0, 0.0, 0.3), (-1.0, 0.0, 0.0))
+
+
+def sunset() -> SkyMap:
+    """Red in the west, green in the east, blue above."""
+    polar, azimuth = np.pi * (1 - (np.arange(32) + 0.5) / 32)[:, None], np.pi * (1 - (np.arange(64) + 0.5) / 32)[None]
+    x, z = np.sin(polar) * np.cos(azimuth), np.cos(polar) + 0 * azimuth
+    return SkyMap(np.stack([1 - x, 1 + x, 1 + z], axis=-1).astype(np.float32))
+
+
+def room(build, sky) -> Scene:
+    """Four metres wide, black, with a window in its east wall; only the white floor is baked."""
+    y, z = (-2.0, -0.4, 0.4, 2.0), (0.0, 0.7, 1.3, 2.5)
+    pieces = [
+        build.quad(
+            f"wall {i} {j}", (2, y[i], z[j]), (0, 0, z[j + 1] - z[j]), (0, y[i + 1] - y[i], 0), 1, receives=False
+        )
+        for i in range(3)
+        for j in range(3)
+        if (i, j) != (1, 1)
+    ]
+    others = [
+        build.quad("west", (-2, -2, 0), (0, 4, 0), (0, 0, 2.5), 1, receives=False),
+        build.quad("south", (-2, -2, 0), (0, 0, 2.5), (4, 0, 0), 1, receives=False),
+        build.quad("north", (-2, 2, 0), (4, 0, 0), (0, 0, 2.5), 1, receives=False),
+        build.quad("ceiling", (-2, -2, 2.5), (0, 4, 0), (4, 0, 0), 1, receives=False),
+    ]
+    floor = build.quad("floor", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    return Scene((floor, *pieces, *others), (WHITE, BLACK), sky=sky, portals=(WINDOW,))
+
+
+@pytest.mark.parametrize("sky", [(1.0, 2.0, 3.0), sunset()], ids=["even", "map"])
+def test_a_portal_changes_the_noise_and_not_the_light(build, sky):
+    """The floor's mean within four standard deviations of what rays alone find: a share of p of the sky, counted with
+    n rays, is good to sqrt(p / n). The light of even a single bake with a portal is nearer to another one's."""
+    scene = room(build, sky)
+    settings = Settings(triangles=1500, error=0.08, threads=2)
+
+    def floor(scene, seed):
+        result = bake(scene, replace(settings, seed=seed))
+        baked = result.objects[0]
+        area = np.linalg.norm(
+            np.cross(*(baked.vertices[baked.triangles[:, k]] - baked.vertices[baked.triangles[:, 0]] for k in (1, 2))),
+            axis=1,
+        )
+        layer = baked.layers["combined"].mean(axis=1)
+        return result, area @ layer / area.sum()
+
+    (with_portal, one), (_, other) = floor(scene, 0), floor(scene, 1)
+    without, plain = floor(replace(scene, portals=()), 0)
+    share = one.max() / 0.5 / 4.0
+    deviation = one * np.sqrt(1 / (share * without.report.rays["gather"]))
+    assert (np.abs(one - plain) <= 4 * deviation + 2e-3 * one).all()
+    assert one == pytest.approx(other, rel=5e-3)
+    assert next(e for e in with_portal.report.effects if e.name == "portals").active
+    assert with_portal.report.estimated_error["sampling"] < without.report.estimated_error["sampling"] / 2
+
+
+def test_a_ray_crosses_a_portal_outward_only():
+    rectangle = Rectangle.of(WINDOW, Space(np.zeros(3), 1.0))
+    origins = np.array([(0, 0, 1), (0, 0, 1), (3, 0, 1), (0, 0, 1), (0, 0, 1)], dtype=np.float32)
+    ways = np.array([(1, 0, 0), (-1, 0, 0), (-1, 0, 0), (1, 0.19, 0), (1, 0.21, 0)], dtype=np.float32)
+    assert rectangle.crossed(origins, ways).tolist() == [True, False, False, True, False]
