@@ -50,7 +50,7 @@ def test_a_portal_changes_the_noise_and_not_the_light(build, sky):
     """The floor's mean within four standard deviations of what rays alone find: a share of p of the sky, counted with
     n rays, is good to sqrt(p / n). The light of even a single bake with a portal is nearer to another one's."""
     scene = room(build, sky)
-    settings = Settings(triangles=1500, error=0.08, threads=2)
+    settings = Settings(size=0.15, error=0.08, threads=2)
 
     def floor(scene, seed):
         result = bake(scene, replace(settings, seed=seed))

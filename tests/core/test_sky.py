@@ -71,7 +71,7 @@ def test_a_gradient_lights_a_tilted_plane(build, normal, estimator):
     less as they are stratified.
     """
     scene = Scene((tilted(build, normal),), (WHITE,), sky=gradient())
-    result = bake(scene, Settings(triangles=50, error=0.08, threads=2, layers=("sky",), estimator=estimator))
+    result = bake(scene, Settings(size=0.2, error=0.08, threads=2, layers=("sky",), estimator=estimator))
     sky = result.objects[0].layers["sky"].reshape(-1, 3)
     expected = 0.5 / np.pi * (np.pi + 2 * np.pi / 3 * SLOPE @ np.array(normal))
     assert sky[:, :2].mean(axis=0) == pytest.approx([expected, 2 * expected], rel=0.014)

@@ -85,7 +85,7 @@ def test_a_sun_in_a_map_lights_and_shades_like_the_lamp(build):
     ground = build.quad("ground", (-1, -1, 0), (2, 0, 0), (0, 2, 0))
     block = build.box("block", (-0.3, -0.3, 0), (0.3, 0.3, 0.5))
     lamp = SunLamp("sun", tuple(-AXIS), tuple(np.pi * radiance * np.sin(angle / 2) ** 2 * np.array([1, 1, 2])), angle)
-    settings = Settings(triangles=500, error=0.08, threads=2)
+    settings = Settings(size=0.12, error=0.08, threads=2)
     surfaces = (Surface("white", (0.5, 0.5, 0.5)),)
     by_map = bake(Scene((ground, block), surfaces, sky=painted(angle, 1.0, 1.0 + radiance)), settings)
     by_lamp = bake(Scene((ground, block), surfaces, (lamp,), sky=(1.0, 1.0, 2.0)), settings)
