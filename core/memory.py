@@ -120,8 +120,12 @@ def same(one: Any, other: Any) -> bool:
 
 
 def _same_question(before: Settings, after: Settings) -> bool:
-    """Whether the same is asked, but for how well, how fast and which layers."""
-    return same(*(replace(s, error=None, seconds=None, threads=0, layers=()) for s in (before, after)))
+    """Whether the same is asked, but for how well, how fast and which layers; the layer Sky has a way of its own."""
+    return same(*(replace(s, error=None, seconds=None, threads=0, layers=_of_sky(s)) for s in (before, after)))
+
+
+def _of_sky(settings: Settings) -> tuple[str, ...]:
+    return tuple(layer for layer in settings.layers if layer == "sky")
 
 
 def _same_but_lamps(before: Scene, after: Scene) -> bool:
