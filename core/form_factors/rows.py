@@ -15,6 +15,8 @@ Int64 = NDArray[np.int64]
 
 #: Entries a chunk: measured fastest, 10 ms per channel and 3 million entries on one core.
 _CHUNK_ENTRIES = 65536
+#: More than what rounding to single precision adds to a number.
+_ROUNDING = 2.0**-22
 #: Beyond this scaling targets cannot be met; the bound keeps the iteration finite.
 _MOST_SCALING = 1e6
 
@@ -111,8 +113,8 @@ def balance(
 
     Symmetric Sinkhorn iteration (P. Knight, The Sinkhorn-Knopp algorithm, 2008) for a handful of steps, or until every
     row is within `tolerance` of its target. What a row still lacks then becomes light it sends to itself: symmetric as
-    well, and small, but where the targets cannot be reached (a patch that sees only one smaller than itself). A row
-    with target zero, and its column, become zero; an empty row stays empty.
+    well, and small, but where the targets cannot be reached (a patch that sees only one smaller than itself, or nobody
+    who sees it): no light is lost. A row with target zero, and its column, become zero.
     """
     target = np.maximum(np.asarray(targets, dtype=np.float64), 0.0)
     scale = (target > 0.0).astype(np.float64)
@@ -126,9 +128,10 @@ def balance(
     weights = scale[i] * exchange.weights * scale[j]
     sums = _sums(i, weights, len(exchange))
     excess = np.divide(target, sums, out=np.ones_like(sums), where=sums > target)
-    weights *= np.minimum(excess[i], excess[j])
-    lacking = np.where(sums > 0.0, np.maximum(target - _sums(i, weights, len(exchange)), 0.0), 0.0)
-    return _with_diagonal(Rows(exchange.indptr, j, weights.astype(np.float32)), lacking)
+    # Rounded before the rest is told, and a hair too small: then the sums are exact in spite of single precision.
+    rounded = (weights * np.minimum(excess[i], excess[j]) * (1.0 - _ROUNDING)).astype(np.float32)
+    lacking = np.maximum(target - _sums(i, rounded, len(exchange)), 0.0)
+    return _with_diagonal(Rows(exchange.indptr, j, rounded), lacking)
 
 
 def _with_diagonal(rows: Rows, diagonal: Float64) -> Rows:

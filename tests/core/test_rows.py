@@ -57,7 +57,8 @@ def test_entries_of_one_place_add_up() -> None:
 def test_no_entries_at_all() -> None:
     rows = Rows.from_triplets([], [], [], 3)
     assert rows.apply(np.ones((5, 2))).tolist() == [[0, 0]] * 3
-    assert (balance(rows, np.ones(3)).weights == 0).all()
+    assert balance(rows, np.ones(3)).apply(np.arange(3.0)).tolist() == [0, 1, 2], "all light returns to where it was"
+    assert (balance(rows, np.zeros(3)).weights == 0).all()
 
 
 def test_threads_give_the_same_bytes() -> None:
