@@ -34,7 +34,8 @@ class Points:
         self.shading = self.normals
         if cells.shading is not None:
             blended = np.einsum("nc,nck->nk", self.weights, cells.shading[chosen])
-            self.shading = blended / np.linalg.norm(blended, axis=1, keepdims=True)
+            length = np.linalg.norm(blended, axis=1, keepdims=True)
+            self.shading = blended / np.maximum(length, 1e-30)  # 0 on a face without area
         self.front = None if cells.front is None else cells.front[cells.surface[chosen]]
 
     def lit_from_behind(self) -> np.ndarray:
