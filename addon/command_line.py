@@ -273,6 +273,11 @@ def _moved_into_place(path: Path) -> Iterator[Path]:
     try:
         yield temporary
         temporary.replace(path)
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise FileError(
+            f"{path} cannot be written ({reason}): is the disk full, or the file open in another program?"
+        ) from problem
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -7,7 +7,7 @@ from functools import partial
 from .adaptation import Adaptation
 from .baked import Baked
 from .bending import Bends
-from .check import check_scene
+from .check import check_cost, check_scene
 from .clock import Clock
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
@@ -49,6 +49,7 @@ def bake(
     given = scene
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
+        check_cost(planned)
     scene = planned.scene
     effort = planned.effort
     clock.progress.expected = planned.seconds

@@ -6,10 +6,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from .scene import ALBEDO_LIMIT, Scene, SceneError, SceneObject, SkyMap, Surface
+from .plan import Plan
+from .scene import ALBEDO_LIMIT, AreaLamp, Scene, SceneError, SceneObject, SkyMap, Surface
 
 #: Beyond this many half extents from the origin, single precision shows in the result.
 _FAR = 1e5
+
+#: Output triangles beyond which no machine that Blender runs on holds a bake.
+_MOST_CELLS = 20_000_000
+
+
+def check_cost(plan: Plan) -> None:
+    """Raise SceneError, with numbers, before memory runs out."""
+    if plan.cells > _MOST_CELLS:
+        raise SceneError(
+            f"This bake would split the objects into {plan.cells:,} triangles and hold {plan.memory_mb / 1e3:,.0f} GB: "
+            f"choose a larger triangle size, or fewer triangles; {_MOST_CELLS:,} are the most."
+        )
 
 
 def check_scene(scene: Scene) -> Scene:
@@ -24,6 +37,8 @@ def check_scene(scene: Scene) -> Scene:
     for lamp in scene.lamps:
         if not np.isfinite(np.concatenate([np.ravel(v) for v in vars(lamp).values() if not isinstance(v, str)])).all():
             raise SceneError(f"Lamp '{lamp.name}' has a value that is not a number: check its transform and its power.")
+        if isinstance(lamp, AreaLamp) and not np.cross(lamp.half_u, lamp.half_v).any():
+            raise SceneError(f"Lamp '{lamp.name}' has no area to shine from: give it a size, or make it a point lamp.")
     sky = scene.sky.pixels if isinstance(scene.sky, SkyMap) else np.array(scene.sky)
     if not np.isfinite(sky).all() or sky.min() < 0:
         raise SceneError("The sky has a colour that is negative or not a number: check the nodes of the world.")

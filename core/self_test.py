@@ -130,8 +130,11 @@ def compare(name: str, known: KnownLight, points: Float64, radiance: Float64, ar
     if known.mean:
         exact, got = np.array([exact.mean()]), np.array([got @ area / area.sum()])
         slack = stated
+    else:
+        seen = area > 0  # Nobody sees a face without area.
+        exact, got = exact[seen], got[seen]
     worst = int(np.argmax(np.abs(got - exact)))
-    error = abs(float(got[worst] - exact[worst]))
+    error = abs(float(got[worst] - exact[worst])) if np.isfinite(radiance).all() else np.inf
     # Values are kept in single precision.
     allowed = (slack + 1e-7) * float(np.abs(exact).max())
     return Outcome(name, float(exact[worst]), float(got[worst]), error, allowed)

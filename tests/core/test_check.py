@@ -60,6 +60,10 @@ BAD = {
     "emission infinite": (lambda s: replace(s, surfaces=(Surface("Paint", emission=(np.inf, 0, 0)),)), "'Paint'"),
     "emission negative": (lambda s: replace(s, surfaces=(Surface("Paint", emission=(-1, 0, 0)),)), "'Paint'"),
     "lamp not a number": (lambda s: replace(s, lamps=(replace(LAMP, intensity=(NAN, 0, 0)),)), "'Bulb'"),
+    "lamp without area": (
+        lambda s: replace(s, lamps=(AreaLamp("Tube", (0, 0, 1), (1, 0, 0), (0, 0, 0), (0, 0, -1), (1.0,) * 3),)),
+        "'Tube'",
+    ),
     "lamp nowhere": (lambda s: replace(s, lamps=(replace(LAMP, position=(0, 0, np.inf)),)), "'Bulb'"),
 }
 
