@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import pytest
+from hypothesis import settings
+
+settings.register_profile("fuzz")
 
 
 @pytest.fixture
@@ -18,3 +21,9 @@ def told(record_property):
         assert abs(got - exact) <= allowed, f"{case}: {got} instead of {exact}, more than {allowed} away. {catches}"
 
     return tell
+
+
+@pytest.fixture
+def long_run() -> bool:
+    """Whether this is `make fuzz`, which repeats what `make test` does a few times."""
+    return settings.get_current_profile_name() == "fuzz"

@@ -1,0 +1,332 @@
+"""The hard cases of the field notes, section 3, one by one.
+
+A furnace judges geometry: where every surface glows with 1 and reflects a half, in a closed room, radiance is 2 on all
+of them, whatever else stands there and however broken its mesh is. So many triangles glow that rays find them, hence
+nothing is sampled but what a ray meets: the figure is exact at every corner, and a ray that leaks, gets lost or counts
+twice shows at once. Seen to fail: rays that start on their surface, a hit's back taken for its front, a mean over
+samples that counts hidden ones, a division by a triangle's area.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from radiosity_baker.addon.bake_scene import bake_objects
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.closed_forms import KnownLight
+from radiosity_baker.core.patches import triangle_geometry
+from radiosity_baker.core.plan import choose_effort
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneObject, SunLamp, Surface
+from radiosity_baker.core.self_test import compare, corners_of
+from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.shapes import box, quad, sphere, triangles
+from radiosity_baker.core.visibility import Visibility
+
+GLOWING = Surface("glowing", (0.5, 0.5, 0.5), (1.0, 1.0, 1.0))
+FLOOR = quad("floor", u=(1, 0, 0), v=(0, 1, 0))
+SHEET = quad("low", u=(0.5, 0, 0), v=(0, 0.5, 0))
+CORNERS = [(0.0, 0.0, 0.0), (0.5, 0.0, 0.0), (0.0, 0.5, 0.0)]
+
+
+def wedge(degrees: float) -> SceneObject:
+    x, z = 0.5 * np.cos(np.radians(degrees)), 0.5 * np.sin(np.radians(degrees))
+    return triangles("wedge", [*CORNERS, (x, 0.0, z)], [[0, 1, 2], [0, 2, 3]])
+
+
+def mirrored(body: SceneObject) -> SceneObject:
+    return replace(body, vertices=body.vertices * (-1, 1, 1))
+
+
+def flipped(body: SceneObject, faces: slice) -> SceneObject:
+    turned = body.triangles.copy()
+    turned[faces] = turned[faces, ::-1]
+    return replace(body, triangles=turned)
+
+
+def crowd(count: int) -> list[SceneObject]:
+    crumb = box("crumb").vertices * 1e-3
+    places = np.random.default_rng(0).uniform(-0.5, 0.5, (count, 3))
+    return [replace(box(f"crumb {k}"), vertices=crumb + place) for k, place in enumerate(places)]
+
+
+#: What stands in the furnace, and what it catches.
+FURNISHED: dict[str, tuple[Callable[[], list[SceneObject]], str]] = {
+    "knife wedge of 0.1 degrees": (lambda: [wedge(0.1)], "rays that start beyond the other side"),
+    "wedge of 179.9 degrees": (lambda: [wedge(179.9)], "neighbours in one plane that see each other"),
+    "box standing on a box": (
+        lambda: [box("low", (-0.5, -0.5, -0.5), (0.5, 0.5, 0)), box("high", (-0.2, -0.2, 0), (0.1, 0.1, 0.4))],
+        "black rings at contacts",
+    ),
+    "boxes side by side, faces coinciding": (
+        lambda: [box("left", (-0.5, 0, 0), (0, 0.5, 0.5)), box("right", (0, 0, 0), (0.5, 0.5, 0.5))],
+        "light between faces that coincide",
+    ),
+    "boxes crossing, vertices inside a solid": (
+        lambda: [box("one", (-0.5, 0, 0), (0.2, 0.5, 0.5)), box("two", (-0.1, 0.2, -0.3), (0.5, 0.4, 0.3))],
+        "vertices inside solids that are dark",
+    ),
+    "box in a box": (lambda: [box("in", (0, 0, 0), (0.2, 0.2, 0.2)), box("out", (-0.3,) * 3, (0.5,) * 3)], "nesting"),
+    "vertex exactly on another face": (
+        lambda: [
+            quad("floor", (-0.5, -0.5, 0), (1, 0, 0), (0, 1, 0)),
+            triangles("tip", [(0, 0, 0), (0.3, 0, 0.3), (0, 0.3, 0.3)], [[0, 1, 2]]),
+        ],
+        "rays aimed at shared vertices",
+    ),
+    "two sheets 1e-4 apart": (
+        lambda: [
+            quad("low", (0, 0, 0), (0.5, 0, 0), (0, 0.5, 0)),
+            quad("high", (0, 0, 1e-4), (0, 0.5, 0), (0.5, 0, 0)),
+        ],
+        "a ray offset larger than the gap",
+    ),
+    "duplicate coplanar faces": (
+        lambda: [triangles("twice", CORNERS, [[0, 1, 2], [0, 1, 2], [2, 1, 0]])],
+        "faces that hide behind themselves",
+    ),
+    "coplanar duplicate objects": (
+        lambda: [quad("a", u=(0.5, 0, 0), v=(0, 0.5, 0)), quad("b", u=(0.5, 0, 0), v=(0, 0.5, 0))],
+        "the same",
+    ),
+    "zero-area faces": (
+        lambda: [triangles("flat", [*CORNERS, (1, 0, 0)], [[0, 1, 2], [0, 1, 3], [1, 1, 2], [0, 0, 0]])],
+        "division by an area",
+    ),
+    "zero-area faces, shaded smooth": (
+        lambda: [
+            replace(
+                triangles("flat", [*CORNERS, (1, 0, 0)], [[0, 1, 2], [0, 1, 3]]),
+                corner_normals=np.tile(np.float32([0, 0, 1]), (2, 3, 1)),
+            )
+        ],
+        "shading normals on faces that have none (found by the fuzzer: NaN)",
+    ),
+    "needles of 1e6 to 1": (
+        lambda: [triangles("needle", [(0, 0, 0), (0.5, 0, 0), (0.5, 5e-7, 0), (0, 0.5, 0)], [[0, 1, 2], [0, 2, 3]])],
+        "normals and splits of thin faces",
+    ),
+    "zero-thickness sheet": (lambda: [quad("sheet", (-0.3, -0.3, 0.1), (0.6, 0, 0), (0, 0.6, 0))], "backs left dark"),
+    "flipped winding": (lambda: [flipped(box("box", (-0.2,) * 3, (0.2,) * 3), slice(None))], "backs left dark"),
+    "mixed winding": (lambda: [flipped(box("box", (-0.2,) * 3, (0.2,) * 3), slice(0, 5))], "backs left dark"),
+    "mirrored": (lambda: [mirrored(box("box", (0.1,) * 3, (0.4,) * 3))], "negative scale"),
+    "one single triangle": (lambda: [triangles("one", CORNERS, [[0, 1, 2]])], "too few of anything"),
+    "loose vertices": (lambda: [triangles("loose", [*CORNERS, (9, 9, 9)], [[0, 1, 2]])], "bounds of what no face uses"),
+    "three faces on an edge": (
+        lambda: [triangles("fan", [*CORNERS, (0, 0, 0.5), (0, 0, -0.5)], [[0, 1, 2], [1, 0, 3], [0, 1, 4]])],
+        "meshes that are no surface",
+    ),
+    "T-junction": (
+        lambda: [triangles("t", [*CORNERS, (0.25, 0.25, 0), (0.5, 0.5, 0)], [[0, 1, 2], [1, 4, 3], [3, 4, 2]])],
+        "cracks",
+    ),
+    "100 crumbs": (lambda: crowd(100), "cost by object, patches that are dust"),
+    "a grain of 1e-5": (
+        lambda: [replace(box("grain"), vertices=1e-5 * box("grain").vertices)],
+        "sizes under the ray offset of the scene",
+    ),
+    "smooth ball": (lambda: [sphere("ball", 0.4, 2, smooth=True)], "light about shading normals"),
+}
+#: The whole furnace, larger and elsewhere.
+PLACES = {
+    "at home": (1.0, 0.0),
+    "a ten-thousandth": (1e-4, 0.0),
+    "a thousandth": (1e-3, 0.0),
+    "a thousand times": (1e3, 0.0),
+    "a hundred thousand times": (1e5, 0.0),
+    "at an offset of 1e5": (1.0, 1e5),
+}
+
+
+def tilt(bodies: list[SceneObject]) -> float:
+    """The largest share of the rays about a shading normal that start below the surface: they bring nothing, as in
+    Cycles. Of a hemisphere tilted by an angle a that is (1 - cos a) / 2."""
+    cosines = [1.0]
+    for body in bodies:
+        if body.corner_normals is not None:
+            normals, area = triangle_geometry(body.vertices[body.triangles])
+            cosines += list(np.einsum("tck,tk->tc", body.corner_normals, normals)[area > 0].ravel())
+    return (1.0 - min(cosines)) / 2.0
+
+
+def furnace(bodies: list[SceneObject], scale: float = 1.0, offset: float = 0.0) -> KnownLight:
+    objects = [*bodies, sphere("room", 2.0, 2, inward=True)]
+    moved = tuple(replace(o, vertices=o.vertices * scale + offset) for o in objects)
+    # Rows that sum to one in double precision, a solve to 1e-5, tables in single precision.
+    return KnownLight(
+        "", Scene(moved, (GLOWING,)), lambda points: np.full(len(points), 2.0), 5e-5 + tilt(bodies), edge=0.7 * scale
+    )
+
+
+def check(case: str, known: KnownLight, told, estimator="hemisphere", tessellate=True, catches="") -> None:
+    settings = Settings(size=known.edge, error=0.1, estimator=estimator, tessellate=tessellate)
+    effort = replace(choose_effort(known.scene, settings), patches=200, tolerance=1e-5, threshold=0.0, growth=0.2)
+    result = bake(known.scene, settings, effort=effort)
+    outcome = compare(case, known, *corners_of(result), result.report.estimated_error["total"])
+    told(f"{case} ({estimator})", outcome.exact, outcome.got, outcome.allowed, catches)
+
+
+@pytest.mark.parametrize("estimator", ["hemisphere", "analytic"])
+@pytest.mark.parametrize("case", FURNISHED)
+def test_furnished_furnace(case, estimator, told):
+    bodies, catches = FURNISHED[case]
+    check(f"furnace: {case}", furnace(bodies()), told, estimator, catches=catches)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_furnace_anywhere(place, told):
+    bodies, _ = FURNISHED["box standing on a box"]
+    check(
+        f"furnace {place}",
+        furnace(bodies(), *PLACES[place]),
+        told,
+        tessellate=False,
+        catches="metres, and single precision",
+    )
+
+
+# ---- The whole way into the attribute ------------------------------------------------------------------------------
+
+
+def into_blender(scene: Scene) -> list[bpy.types.Object]:
+    """The scene's objects, surfaces and grey sky in the Blender that runs."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    materials = [_material(surface) for surface in scene.surfaces]
+    made = []
+    for o in scene.objects:
+        mesh = bpy.data.meshes.new(o.name)
+        mesh.from_pydata(o.vertices.tolist(), [], o.triangles.tolist())
+        for material in materials:
+            mesh.materials.append(material)
+        mesh.polygons.foreach_set("use_smooth", np.full(len(o.triangles), o.corner_normals is not None))
+        made.append(bpy.data.objects.new(o.name, mesh))
+        bpy.context.scene.collection.objects.link(made[-1])
+    bpy.context.view_layer.update()
+    return made
+
+
+def _material(surface: Surface) -> bpy.types.Material:
+    material = bpy.data.materials.new(surface.name)
+    if material.node_tree is None:
+        material.use_nodes = True
+    tree = material.node_tree
+    tree.nodes.clear()
+    output, both, diffuse, glow = (
+        tree.nodes.new(f"ShaderNode{kind}") for kind in ("OutputMaterial", "AddShader", "BsdfDiffuse", "Emission")
+    )
+    diffuse.inputs["Color"].default_value = (*surface.albedo, 1.0)
+    glow.inputs["Color"].default_value = (*surface.emission, 1.0)
+    tree.links.new(diffuse.outputs[0], both.inputs[0])
+    tree.links.new(glow.outputs[0], both.inputs[1])
+    tree.links.new(both.outputs[0], output.inputs["Surface"])
+    return material
+
+
+@pytest.mark.parametrize("result_mode", ["keep", "new"])
+@pytest.mark.parametrize("case", FURNISHED)
+def test_into_the_attribute(case, result_mode, told):
+    """What the mesh holds in the end is the exact value too: nothing is lost between Blender's faces and core's."""
+    bodies, catches = FURNISHED[case]
+    objects = into_blender(furnace(bodies()).scene)
+    asked = [o for o in objects if o.name != "room"][:3]
+    settings = Settings(triangles=100, error=0.1, tessellate=result_mode != "keep")
+    effort = replace(choose_effort(furnace(bodies()).scene, settings), patches=200, tolerance=1e-5)
+    _, written = bake_objects(
+        bpy.context, asked, settings, result_mode=result_mode, attribute="Radiosity", effort=effort
+    )
+    light = np.concatenate([_seen_colors(o.data) for o in written])
+    got = float(light[np.argmax(np.abs(light - 2.0))])
+    told(f"attribute ({result_mode}): {case}", 2.0, got, 2e-4 + 2 * tilt(bodies()), catches)
+
+
+def _seen_colors(mesh: bpy.types.Mesh) -> np.ndarray:
+    """The baked values of the corners of all faces that have an area; none may be no number."""
+    data = mesh.color_attributes["Radiosity"].data
+    colors = np.empty(4 * len(data), np.float32)
+    data.foreach_get("color", colors)
+    assert np.isfinite(colors).all()
+    area, total = np.empty((2, len(mesh.polygons)), np.float32)
+    mesh.polygons.foreach_get("area", area)
+    mesh.polygons.foreach_get("loop_total", total)
+    return colors.reshape(-1, 4)[np.repeat(area > 0, total.astype(int)), :3].ravel()
+
+
+# ---- Shadows whose share is known ----------------------------------------------------------------------------------
+
+DOWN = SunLamp("sun", (0.0, 0.0, -1.0), (np.pi,) * 3)
+WHITE, BLACK = Surface("white", (0.5,) * 3), Surface("black", (0.0,) * 3)
+
+
+def shaded(share: float, *blockers: SceneObject, sun: SunLamp = DOWN) -> KnownLight:
+    """A floor of which the sun reaches a share, straight from above unless said; blockers are black, and not baked."""
+    black = tuple(replace(b, surface=b.surface + 1, receives=False) for b in blockers)
+    return KnownLight(
+        "", Scene((FLOOR, *black), (WHITE, BLACK), (sun,)), lambda p: np.full(len(p), 0.5 * share), 0.0, 0.05, True
+    )
+
+
+def ball_of_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(0)
+    ways = rng.normal(size=(count, 3)).astype(np.float32)
+    return np.tile(np.float32([0.1, 0.05, -0.02]), (count, 1)), ways
+
+
+SHADED: dict[str, tuple[Callable[[], KnownLight], str]] = {
+    "blocker smaller than a patch": (
+        lambda: shaded(1 - 0.03**2, quad("dot", (0.31, 0.42, 0.5), (0.03, 0, 0), (0, 0.03, 0))),
+        "visibility as yes or no of a patch",
+    ),
+    "sun grazing at 0.1 degrees": (
+        lambda: shaded(
+            np.sin(np.radians(0.1)),
+            sun=SunLamp("sun", (np.cos(np.radians(0.1)), 0.0, -np.sin(np.radians(0.1))), (np.pi,) * 3),
+        ),
+        "shadow rays that start behind their own surface",
+    ),
+    "sun straight along the floor": (
+        lambda: shaded(0.0, sun=SunLamp("sun", (1.0, 0.0, 0.0), (np.pi,) * 3)),
+        "light from the horizon",
+    ),
+    "floor in full shade": (lambda: shaded(0.0, quad("roof", (-5, -5, 0.1), (11, 0, 0), (0, 11, 0))), "leaks"),
+}
+
+
+@pytest.mark.parametrize("case", SHADED)
+def test_share_of_sun(case, told):
+    """The mean over the floor, within the error that the bake states."""
+    known, catches = SHADED[case][0](), SHADED[case][1]
+    check(case, known, told, catches=catches)
+
+
+@pytest.mark.parametrize("shell", [box("shell", (-1,) * 3, (1,) * 3), sphere("shell", 1.0, 4)], ids=["box", "ball"])
+def test_watertight_under_a_million_rays(shell, told, long_run):
+    """Ten millions in the long run."""
+    visibility = Visibility(shell.vertices[shell.triangles])
+    lost = 0
+    for _ in range(10 if long_run else 1):
+        lost += int((visibility.nearest(*ball_of_rays(1_000_000)) < 0).sum())
+    told(f"rays that leave a closed shell of {len(shell.triangles)} faces", 0, lost, 0, "cracks between triangles")
+
+
+LAMPS_NEAR = {
+    "on the floor": PointLamp("lamp", (0.5, 0.5, 0.0), (1.0,) * 3),
+    "1e-4 over the floor": PointLamp("lamp", (0.5, 0.5, 1e-4), (1.0,) * 3),
+    "at a vertex": PointLamp("lamp", (0.0, 0.0, 0.0), (1.0,) * 3),
+    "a ball through the floor": PointLamp("lamp", (0.5, 0.5, 0.0), (1.0,) * 3, 0.1, facing_disc=False),
+    "a panel in the floor's plane": AreaLamp("lamp", (0.5, 0.5, 0), (0.2, 0, 0), (0, 0.2, 0), (0, 0, 1), (1.0,) * 3),
+    "inside a box": PointLamp("lamp", (5.5, 5.5, 5.5), (1.0,) * 3),
+}
+
+
+@pytest.mark.parametrize("case", LAMPS_NEAR)
+def test_lamps_in_bad_places_give_finite_light(case, told):
+    """Only where the light goes is asked here: nowhere negative, nowhere infinite, nowhere NaN."""
+    objects = (FLOOR, box("box", (5,) * 3, (6,) * 3))
+    result = bake(Scene(objects, (WHITE,), (LAMPS_NEAR[case],)), Settings(triangles=100, error=0.1))
+    light = corners_of(result)[1]
+    broken = int(np.count_nonzero(~np.isfinite(light)) + np.count_nonzero(light < 0))
+    told(f"broken values: lamp {case}", 0, broken, 0, "poles of the inverse square law")
