@@ -143,10 +143,10 @@ class PlanSection:
             _figure(column, "Time", tr("About {amount}").format(amount=f"{plan['seconds']:.1f} s"))
             _figure(column, "Memory", tr("About {amount}").format(amount=f"{plan['memory_mb']:,.0f} MB"))
         if plan.get("costs"):
-            row = layout.row(align=True)
+            grid = layout.grid_flow(columns=2, even_columns=True, align=True)
             for error, seconds in plan["costs"]:
                 text = f"{100 * error:g} %: {seconds:.0f} s"
-                row.operator("object.radiosity_accuracy", text=text).percent = 100 * error
+                grid.operator("object.radiosity_accuracy", text=text).percent = 100 * error
         for effect in plan.get("effects", ()):
             column = layout.column(align=True)
             column.active = effect["active"]

@@ -329,6 +329,7 @@ def check_the_scene():
     """Turn one face over, see it named, and mend it."""
     block = next(o for o in bpy.context.scene.objects if o.name == "Short block")
     block.data.polygons[0].flip()
+    block.data.update()
     bpy.ops.object.radiosity_plan()
     yield 0.5
     yield from picture("check")
