@@ -118,13 +118,21 @@ def _cycles(
     begun, busy = perf_counter(), process_time()
     corners = corner_bake(bpy.context, copies, samples=samples, seed=_SEED + 1, threads=threads)
     seconds, busy = perf_counter() - begun, process_time() - busy
+    objects = with_corners(baked, sources, corners)
+    return _step("Cycles", f"{samples:,} samples", reference, objects, seconds, busy)
+
+
+def with_corners(
+    baked: Sequence[BakedObject], sources: Sequence[ReceiverSource], corners: Sequence[Float64]
+) -> list[BakedObject]:
+    """The baked meshes with other values: those that their corners have in Blender, (corners, 3) for each source."""
     ours = {own.name: own for own in baked}
     objects = []
     for source, values in zip(sources, corners, strict=True):
         turn = [0, 2, 1] if source.flipped else [0, 1, 2]
         layer = values.reshape(-1, 3, 3)[:, turn].astype(np.float32)
         objects.append(replace(ours[source.name], layers={"combined": layer}))
-    return _step("Cycles", f"{samples:,} samples", reference, objects, seconds, busy)
+    return objects
 
 
 def _step(

@@ -1,0 +1,240 @@
+"""Runs the benchmark and writes its tables into docs/speed.md and all figures into build/bench/bench.json.
+
+Without arguments everything, in about 20 minutes on two idle cores; the words around the tables stay as they were.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...core.parallel import thread_count
+from ...core.plan import choose_effort
+from ...core.settings import Settings
+from .measure import Reference, Run, bake_once, bake_twice, cycles_runs, make_reference
+from .scenes import SCENES
+
+DOCS = Path(__file__).resolve().parents[1]
+FOLDER = DOCS.parent / "build" / "bench"
+BEGIN, END = "<!-- measured -->\n", "<!-- end -->\n"
+#: What a stated error may be, relative to the true one.
+HONEST = (0.7, 1.5)
+
+
+@dataclass(frozen=True)
+class Scale:
+    """triangles of the receivers before they are adapted; asked errors, whose middle makes the mesh for Cycles; samples
+    of Cycles; points of the reference and its paths; sizes of the growth; patches of the original scheme."""
+
+    triangles: int
+    errors: tuple[float, ...]
+    cycles: tuple[int, ...]
+    points: int
+    paths: int
+    sizes: tuple[int, ...]
+    patches: tuple[int, ...]
+
+
+FULL = Scale(
+    triangles=12_000,
+    errors=(0.2, 0.1, 0.05, 0.03, 0.02, 0.01),
+    cycles=(16, 64, 256),
+    points=2_000,
+    paths=256,
+    sizes=(1_000, 10_000, 100_000, 1_000_000),
+    patches=(1_000, 3_000, 10_000),
+)
+QUICK = Scale(
+    triangles=500, errors=(0.2, 0.1), cycles=(1, 4), points=100, paths=16, sizes=(500, 1_000), patches=(100, 300)
+)
+#: Where growth and the original scheme are measured: light goes round corners, and nearly nothing escapes.
+_CLOSED = "doorway"
+
+
+def against_cycles(name: str, scale: Scale, threads: int) -> tuple[Reference, list[Run], list[Run]]:
+    """The reference, our bakes at each asked error, and Cycles' on the mesh of the middle one."""
+    reference = make_reference(name, scale.points, scale.paths, FOLDER)
+    middle = scale.errors[len(scale.errors) // 2]
+    ours = {}
+    for error in sorted(scale.errors, key=lambda e: e == middle):
+        settings = Settings(triangles=scale.triangles, error=error, threads=threads)
+        baked = bake_twice(name, f"{error:.0%} asked", settings, reference)
+        ours[error] = baked.run
+        _say(name, baked.run)
+    rivals = cycles_runs(baked, scale.cycles, reference, threads)
+    for run in rivals:
+        _say(f"{name}, Cycles", run)
+    return reference, [ours[error] for error in scale.errors], rivals
+
+
+def growth(scale: Scale, threads: int) -> Iterator[Run]:
+    """The same scene with more and more triangles, at 5 %."""
+    for size in scale.sizes:
+        run = bake_once(_CLOSED, f"{size:,} asked", Settings(triangles=size, error=0.05, threads=threads), None).run
+        _say("growth", run)
+        yield run
+
+
+def original_scheme(scale: Scale, threads: int) -> Iterator[Run]:
+    """Centroid form factors and plain shooting, beside the hemisphere at as many patches."""
+    reference = make_reference(_CLOSED, scale.points, scale.paths, FOLDER)
+    for patches in scale.patches:
+        for estimator in ("centroid", "hemisphere"):
+            asked = Settings(triangles=scale.triangles, error=None, estimator=estimator, threads=threads)
+            effort = replace(choose_effort(reference.scene, asked), patches=patches)
+            run = bake_once(_CLOSED, f"{estimator}, {patches:,} patches", asked, reference, effort).run
+            _say("original scheme", run)
+            yield run
+
+
+def sooner(ours: Sequence[Run], rival: Run, measure: str) -> float:
+    """How many times as long the rival takes as our fastest bake that is at least as good; nan when none is."""
+    good = [run.seconds for run in ours if getattr(run, measure) <= getattr(rival, measure)]
+    return rival.seconds / min(good) if good else float("nan")
+
+
+def report(results: dict[str, Any]) -> str:
+    """The tables of docs/speed.md."""
+    threads = results["threads"]
+    text = f"On {threads} threads.\n"
+    if results["scenes"]:
+        text += "\n### Against Cycles: how many times as fast\n\n" + _table(*_ratios(results["scenes"]))
+        text += "\n### Every bake\n\n" + _table(*_runs(results["scenes"], threads))
+        text += "\n" + _honesty(results["scenes"])
+    if results["growth"]:
+        text += "\n### Growth\n\n" + _table(*_growth(results["growth"])) + "\n" + _exponent(results["growth"])
+    if results["original"]:
+        text += "\n### The original scheme\n\n" + _table(*_original(results["original"]))
+    return text
+
+
+def _ratios(scenes: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+    head, rows = ["scene", "triangles"], []
+    for name, (_, ours, rivals) in scenes.items():
+        row, wins = [_plain(name), f"{rivals[0].triangles:,}"], []
+        for rival in rivals:
+            for measure in ("noise", "surface"):
+                wins.append((f"{measure} of {rival.name}", sooner(ours, rival, measure)))
+        rows.append([*row, *(f"{win:.0f}" for _, win in wins)])
+        head = ["scene", "triangles", *(title for title, _ in wins)]
+    values = np.array([[float(cell) for cell in row[2:]] for row in rows])
+    rows.append(["**median**", "", *(f"{win:.0f}" for win in np.nanmedian(values, axis=0))])
+    return head, rows
+
+
+def _runs(scenes: dict[str, Any], threads: int) -> tuple[list[str], list[list[str]]]:
+    head = ["scene", "bake", "triangles", "patches", "Mrays", "seconds", "processor s", "of Embree alone", "predicted s",
+            "noise", "surface error", "typical", "bias", "stated", "stated / true"]  # fmt: skip
+    rows = []
+    for name, (_, ours, rivals) in scenes.items():
+        for run in [*ours, *rivals]:
+            own = run.patches > 0
+            rows.append([
+                _plain(name), run.name if own else f"Cycles, {run.name}", f"{run.triangles:,}",
+                f"{run.patches:,}" if own else "", f"{run.rays['total'] / 1e6:.2f}" if own else "",
+                f"{run.seconds:.2f}", f"{run.processor:.2f}",
+                f"{run.seconds * threads / run.embree:.1f} x" if own else "", f"{run.predicted:.2f}" if own else "",
+                f"{run.noise:.2%}", f"{run.surface:.2%}", f"{run.typical:.2%}", f"{run.bias:+.2%}",
+                f"{run.stated:.2%}" if own else "", f"{run.stated / run.surface:.2f}" if own else "",
+            ])  # fmt: skip
+    return head, rows
+
+
+def _honesty(scenes: dict[str, Any]) -> str:
+    ratios = [run.stated / run.surface for _, ours, _ in scenes.values() for run in ours]
+    within = sum(HONEST[0] <= ratio <= HONEST[1] for ratio in ratios)
+    off = [run.predicted / run.seconds for _, ours, _ in scenes.values() for run in ours]
+    good = sum(1 / 1.5 <= ratio <= 1.5 for ratio in off)
+    return (
+        f"Stated over true error: {within} of {len(ratios)} within {HONEST[0]} to {HONEST[1]}, smallest "
+        f"{min(ratios):.2f}, largest {max(ratios):.2f}. Predicted over actual seconds: {good} of {len(off)} within a "
+        f"factor of 1.5, smallest {min(off):.2f}, largest {max(off):.2f}.\n"
+    )
+
+
+def _growth(runs: Sequence[Run]) -> tuple[list[str], list[list[str]]]:
+    head = ["triangles", "seconds", "predicted s", "stated error", "peak MB", "predicted MB", "Mrays"]
+    return head, [
+        [f"{run.triangles:,}", f"{run.seconds:.2f}", f"{run.predicted:.2f}", f"{run.stated:.2%}",
+         f"{run.peak_mb:,.0f}", f"{run.predicted_mb:,.0f}", f"{run.rays['total'] / 1e6:.1f}"]
+        for run in runs
+    ]  # fmt: skip
+
+
+def _exponent(runs: Sequence[Run]) -> str:
+    count, seconds = (np.log([getattr(run, name) for run in runs]) for name in ("triangles", "seconds"))
+    return f"Seconds grow as the number of triangles to the power of {np.polyfit(count, seconds, 1)[0]:.2f}.\n"
+
+
+def _original(runs: Sequence[Run]) -> tuple[list[str], list[list[str]]]:
+    return ["bake", "patches", "seconds", "surface error", "typical", "bias", "stated"], [
+        [run.name, f"{run.patches:,}", f"{run.seconds:.2f}", f"{run.surface:.2%}", f"{run.typical:.2%}",
+         f"{run.bias:+.2%}", f"{run.stated:.2%}"]
+        for run in runs
+    ]  # fmt: skip
+
+
+def _table(head: list[str], rows: list[list[str]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", " ").capitalize()
+
+
+def _say(where: str, run: Run) -> None:
+    print(
+        f"{where}: {run.name}, {run.triangles:,} triangles, {run.seconds:.2f} s, noise {run.noise:.2%}, surface error "
+        f"{run.surface:.2%}, stated {run.stated:.2%}",
+        flush=True,
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="make bench", description=__doc__)
+    parser.add_argument("scenes", nargs="*", choices=[*SCENES, []], help="measure these against Cycles; else all")
+    parser.add_argument("--parts", default="growth,scenes,original", help="what to measure, with commas between")
+    parser.add_argument("--threads", type=int, default=0)
+    parser.add_argument("--quick", action="store_true", help="a few seconds of everything, to see that it works")
+    parser.add_argument("--output", type=Path, help="where the tables go; docs/speed.md by default")
+    asked = parser.parse_args(arguments)
+    scale, parts = QUICK if asked.quick else FULL, asked.parts.split(",")
+    results: dict[str, Any] = {"threads": thread_count(asked.threads)}
+    # The largest first: the most memory a process has held is all that a system tells.
+    results["growth"] = list(growth(scale, asked.threads)) if "growth" in parts else []
+    names = asked.scenes or list(SCENES) if "scenes" in parts else []
+    results["scenes"] = {name: against_cycles(name, scale, asked.threads) for name in names}
+    results["original"] = list(original_scheme(scale, asked.threads)) if "original" in parts else []
+    _write(results, asked.output or DOCS / "speed.md")
+    return 0
+
+
+def _write(results: dict[str, Any], document: Path) -> None:
+    """The tables into the document, between the two marks; the figures into a JSON file."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    plain = {
+        **results,
+        "growth": [asdict(run) for run in results["growth"]],
+        "original": [asdict(run) for run in results["original"]],
+        "scenes": {
+            name: {"reference_noise": reference.noise, "ours": [asdict(r) for r in ours],
+                   "cycles": [asdict(r) for r in rivals]}
+            for name, (reference, ours, rivals) in results["scenes"].items()
+        },
+    }  # fmt: skip
+    (FOLDER / "bench.json").write_text(json.dumps(plain, indent=1), encoding="utf-8")
+    before = document.read_text(encoding="utf-8") if document.exists() else f"# Speed\n\n{BEGIN}{END}"
+    head, _, rest = before.partition(BEGIN)
+    document.write_text(f"{head}{BEGIN}{report(results)}{END}{rest.partition(END)[2]}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())
