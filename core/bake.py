@@ -9,6 +9,7 @@ from .baked import Baked
 from .bending import Bends
 from .check import check_cost, check_scene
 from .clock import Clock
+from .cost import refuse_without_room
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
 from .direct.lamps import place
@@ -40,7 +41,8 @@ def bake(
 
     effort: to work just so hard, instead of as hard as the settings call for. memory: of the last bake, to go on from
     where it can.
-    Raises SceneError for a scene that cannot be baked, Cancelled when progress says so.
+    Raises SceneError for a scene that cannot be baked or needs more memory than is free, Cancelled when progress says
+    so.
     """
     clock = Clock(progress or Progress())
     recalled = memory.recall(scene, settings, clock) if memory else None
@@ -50,6 +52,7 @@ def bake(
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
         check_cost(planned)
+        refuse_without_room(planned.memory_mb)
     scene = planned.scene
     effort = planned.effort
     clock.progress.expected = planned.seconds

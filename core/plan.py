@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from time import perf_counter
 
 import numpy as np
 
+from .cost import Work, calibrate
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
 from .effects import LAMPS, choose_effects, emitters_by_rays, goes_on
-from .parallel import Workers, thread_count
-from .patches import Space, make_patches, split_objects, unit_space
-from .progress import Progress
 from .result import Effect
-from .sampling import stream
 from .scene import Scene
 from .settings import Settings
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
-from .visibility import Visibility
 
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky")
@@ -29,14 +24,18 @@ REST = "the rest"
 _COARSEST = 16.0
 #: Triangles and patches below which a bake shows next to nothing.
 _FEWEST = 1500
-#: Rays that measure how fast this machine traces this scene.
-_CALIBRATION_RAYS = 1 << 16
-#: What a ray that looks around, a shadow ray, a cell and a patch side cost, in rays that only meet something: measured
-#: on the sample scenes, as ratios, which machines share better than seconds.
-_RAY_COST, _SHADOW_COST, _CELL_COST, _SIDE_COST = 1.7, 1.5, 180.0, 300.0
 #: Choosing among many emitting triangles costs as much as this many lamps.
 _TREE_COST = 8
-_BYTES_PER_CELL, _BYTES_PER_SIDE, _BYTES_AT_REST = 4000.0, 6000.0, 200e6
+#: Relative errors that sampling leaves after two passes, and the triangles, with as many rays and on as many cells as
+#: named: typical of the scenes of `make bench`. Sampling falls with the cube root of the cells, since neighbours share what they learn;
+#: resolution with the square root.
+_TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0.01, 32, 20_000
+#: Errors that the panel shows the price of.
+PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
+#: How many times as many patches there are after those have been split that light breaks in: typical.
+_MORE_PATCHES = 1.6
+#: Each step of thrift leaves this share of the work.
+_THRIFT, _MOST_THRIFT = 0.8, 24
 
 
 @dataclass(frozen=True)
@@ -96,27 +95,105 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     effort: to work just so hard, instead of as hard as the settings call for.
     """
     effects, scene = choose_effects(scene, settings)
+    prices = _Prices(scene, effects, settings)
     if effort is not None:
-        return _priced(scene, settings, effects, effort)
+        return prices.of(effort)
     effort = choose_effort(scene, settings)
-    planned = _priced(scene, settings, effects, effort)
+    planned = prices.of(effort)
     if settings.seconds is None or planned.seconds <= settings.seconds:
         return planned
-    # Too little time for all: fewer triangles and patches, down to where they would show nothing any more.
-    share = max(settings.seconds / planned.seconds, 0.02)
-    patches = max(int(effort.patches * share), min(effort.patches, _FEWEST))
-    triangles = max(int(effort.triangles * share), _FEWEST)
-    fewer = replace(effort, triangles=triangles, coarsest=1.0, growth=0.3, patches=patches)
-    return replace(_priced(scene, settings, effects, fewer), seconds=settings.seconds)
+    # Too little time for all: the least thrift that meets it, by bisection, or as much as still shows something.
+    enough, short = _MOST_THRIFT, 0
+    while enough - short > 1:
+        middle = (enough + short) // 2
+        met = prices.of(thriftier(effort, middle)).seconds <= settings.seconds
+        enough, short = (middle, short) if met else (enough, middle)
+    planned = prices.of(thriftier(effort, enough))
+    return replace(planned, seconds=max(planned.seconds, settings.seconds))
 
 
-def _priced(scene: Scene, settings: Settings, effects: tuple[Effect, ...], effort: Effort) -> Plan:
-    receivers = scene.receivers()
-    vertices, triangles = [o.vertices for o in receivers], [o.triangles for o in receivers]
-    edge = settings.size or edge_for_count(vertices, triangles, effort.triangles)
-    unpriced = Plan(scene, effects, effort, predicted_count(vertices, triangles, edge), {}, 0.0, 0.0)
-    costs, memory = predict(scene, settings, unpriced)
-    return replace(unpriced, costs=costs, seconds=sum(costs.values()), memory_mb=memory)
+def thriftier(effort: Effort, steps: int) -> Effort:
+    """Less of everything that can be less: triangles where the mesh has them not itself, patches, and rays."""
+    share = _THRIFT**steps
+    rays = share**0.5
+    return replace(
+        effort,
+        triangles=max(int(effort.triangles * share), min(effort.triangles, _FEWEST)),
+        coarsest=max(effort.coarsest * share, 1.0),
+        growth=effort.growth * min(share, 0.3),
+        patches=max(int(effort.patches * share), min(effort.patches, _FEWEST // 4)),
+        transport_rays=max(8 * int(effort.transport_rays * rays / 8), 16),
+        gather_rays=max(2 * int(effort.gather_rays * rays / 2), 8),
+        shadow_rays=max(2 * int(effort.shadow_rays * rays / 2), 2),
+        boundary_passes=max(2 * int(effort.boundary_passes * rays / 2), 2),
+    )
+
+
+def price_of_accuracy(scene: Scene, settings: Settings, errors: tuple[float, ...] = PRICED_ERRORS) -> dict[float, Plan]:
+    """What each error would cost on this scene: one calibration for all, then next to no time."""
+    effects, scene = choose_effects(scene, settings)
+    asked = {error: replace(settings, error=error, seconds=None) for error in errors}
+    prices = _Prices(scene, effects, asked[errors[0]])
+    return {error: prices.of(choose_effort(scene, wish)) for error, wish in asked.items()}
+
+
+class _Prices:
+    """Plans of one scene by effort; the machine is measured once."""
+
+    def __init__(self, scene: Scene, effects: tuple[Effect, ...], settings: Settings) -> None:
+        self._unpriced = Plan(scene, effects, choose_effort(scene, settings), 0, {}, 0.0, 0.0)
+        self._settings = settings
+        self._machine = calibrate(scene, settings.threads)
+        self._pieces = len(emitting_pieces(scene))
+        self._own = sum(len(o.triangles) for o in scene.objects)
+        self._cells: dict[int, int] = {}
+
+    def of(self, effort: Effort) -> Plan:
+        """The plan with its cells, seconds and memory filled in."""
+        if effort.triangles not in self._cells:
+            self._cells[effort.triangles] = self._count(effort.triangles)
+        unpriced = replace(self._unpriced, effort=effort, cells=self._cells[effort.triangles])
+        works = self._works(unpriced)
+        costs = {name: self._machine.seconds(work) for name, work in works.items()}
+        memory = sum(work.memory_mb for work in works.values())
+        return replace(unpriced, costs=costs, seconds=sum(costs.values()), memory_mb=memory)
+
+    def _count(self, triangles: int) -> int:
+        receivers = self._unpriced.scene.receivers()
+        vertices, own = [o.vertices for o in receivers], [o.triangles for o in receivers]
+        edge = self._settings.size or edge_for_count(vertices, own, triangles)
+        return predicted_count(vertices, own, edge)
+
+    def _works(self, planned: Plan) -> dict[str, Work]:
+        """What each effect calls for, and what serves them all (REST)."""
+        effort, scene = planned.effort, planned.scene
+        # Boundaries of light take about as many more cells as the error asked for is small, up to what is allowed.
+        cells = planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
+        passes = self._passes(effort, cells)
+        patches = _MORE_PATCHES * effort.patches if planned.looks_around else 0.0
+        pieces = self._pieces
+        if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
+            pieces = _TREE_COST
+        asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces, 1))
+        per_light = asked * effort.shadow_rays * (cells * (passes + 1) + 8 * patches)
+        lights = {name: sum(isinstance(lamp, kind) for lamp in scene.lamps) for name, kind in LAMPS.items()}
+        works = {name: Work(shadow=per_light * count) for name, count in lights.items() if count}
+        if pieces:
+            works["emitting surfaces"] = Work(shadow=per_light * pieces)
+        if planned.looks_around:
+            # One look serves all that it may meet: it counts for the first of them.
+            first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
+            look = Work(2 * patches * effort.transport_rays, cells * passes * effort.gather_rays, patches=patches)
+            works[first] = replace(look, shadow=works[first].shadow) if first in works else look
+        return {**works, REST: Work(cells=cells, own=self._own, fits=1 if passes <= effort.passes else 2)}
+
+    def _passes(self, effort: Effort, cells: float) -> float:
+        if self._settings.error is None:
+            return effort.passes
+        finer = cells / _TYPICAL_CELLS
+        rays = effort.gather_rays / _TYPICAL_RAYS
+        sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
+        return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
@@ -148,43 +225,3 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
 def gather_rays(error: float) -> int:
     """Rays of a sample point: as many as bring its noise in proportion to the asked error. A power of two."""
     return int(2 ** np.clip(np.rint(np.log2(32 * (0.02 / error) ** 2)), 3, 6))
-
-
-def predict(scene: Scene, settings: Settings, unpriced: Plan) -> tuple[dict[str, float], float]:
-    """Seconds by effect (those of REST serve all), and peak MB of the bake, from how long a few rays take here."""
-    effort, cells = unpriced.effort, unpriced.cells
-    sides = 1.2 * effort.patches if unpriced.looks_around else 0
-    work = dict.fromkeys((*(kind for kind in LAMPS), "emitting surfaces"), 0.0)
-    per_light = _SHADOW_COST * effort.shadow_rays * (cells * (effort.passes + 3) + 16 * sides)
-    pieces = len(emitting_pieces(scene))
-    if unpriced.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
-        pieces = _TREE_COST
-    asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces, 1))
-    for name, kind in LAMPS.items():
-        work[name] = asked * per_light * sum(isinstance(lamp, kind) for lamp in scene.lamps)
-    work["emitting surfaces"] = asked * per_light * pieces
-    if unpriced.looks_around:
-        around = 2 * sides * effort.transport_rays + cells * effort.passes * effort.gather_rays
-        # One look serves all that it may meet: it counts for the first of them.
-        first = next((name for name in LOOKING if unpriced.active(name)), "emitting surfaces")
-        work[first] = work.get(first, 0.0) + around * _RAY_COST + sides * _SIDE_COST
-    work[REST] = cells * _CELL_COST
-    per_ray = _seconds_per_ray(scene, unit_space(scene), thread_count(settings.threads))
-    memory = (_BYTES_AT_REST + cells * _BYTES_PER_CELL + sides * _BYTES_PER_SIDE) / 1e6
-    return {name: amount * per_ray for name, amount in work.items() if amount > 0}, memory
-
-
-def _seconds_per_ray(scene: Scene, space: Space, threads: int) -> float:
-    """Seconds that all threads together need for a ray that looks around."""
-    patches = make_patches(scene, space, split_objects(scene, 2048))
-    visibility = Visibility(patches.corners)
-    rng = stream(0, "calibration")
-    chosen = rng.integers(len(patches.area), size=_CALIBRATION_RAYS)
-    directions = rng.normal(size=(_CALIBRATION_RAYS, 3)) + 1.5 * patches.normals[chosen]
-    origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
-    rays = origins.astype(np.float32), directions.astype(np.float32)
-    with Workers(threads, Progress()) as workers:
-        begun = perf_counter()
-        for _ in workers.map(lambda *_: visibility.nearest(*rays), threads, 1):
-            pass
-        return (perf_counter() - begun) / (threads * _CALIBRATION_RAYS)

@@ -20,9 +20,10 @@ from .settings import Settings
 from .survey import Survey
 from .textures import Colours
 
-#: Sampling and resolution share the asked error; below this share of the resolution, sampling no longer shows.
-_SAMPLING_SHARE, _RESOLUTION_SHARE = 0.7, 0.5
-_MOST_ROUNDS, _MOST_PASSES = 3, 128
+#: Squared sampling error, relative to that of the rest, which no longer shows beside it.
+_HIDDEN = 0.25
+#: How often the error is estimated anew, and how many times as many passes each time at most: more cannot be foreseen.
+_MOST_ROUNDS, _MOST_GROWTH = 3, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +64,11 @@ def refine(
             survey.run_pass()
             if clock.progress.watched:
                 show(average_light(survey))
-        survey.refine_boundaries(effort.boundary_passes)
+        seconds = settings.seconds or np.inf
+        if clock.elapsed < seconds:
+            survey.refine_boundaries(effort.boundary_passes)
     seconds_per_pass = (perf_counter() - begun) / effort.passes
+    tried: list[tuple[int, ErrorEstimate]] = []
     for round_number in range(_MOST_ROUNDS):
         begun = perf_counter()
         with clock.stage("fit", 0.75 + 0.05 * round_number):
@@ -72,10 +76,12 @@ def refine(
         seconds_to_fit = perf_counter() - begun
         if clock.progress.watched:
             show(light)
-        more = _passes_wanted(survey, light.error, settings)
-        if settings.seconds is not None:
-            left = settings.seconds - clock.elapsed - seconds_to_fit
-            more = min(more, int(left / seconds_per_pass) // 2 * 2)
+        if settings.error is None and settings.seconds is None:
+            break
+        tried.append((survey.passes, light.error))
+        left = seconds - clock.elapsed - seconds_to_fit
+        more = min(passes_wanted(tried, settings.error or 0.0), max(left, 0.0) / seconds_per_pass)
+        more = int(more) // 2 * 2
         if more < 2:
             break
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
@@ -88,13 +94,25 @@ def refine(
     return light
 
 
-def _passes_wanted(survey: Survey, error: ErrorEstimate, settings: Settings) -> int:
-    """How many more passes, an even number, bring sampling to what is asked or to where the mesh cannot show it."""
-    if settings.error is None:
-        return _MOST_PASSES if settings.seconds is not None else 0
-    target = max(_SAMPLING_SHARE * settings.error, _RESOLUTION_SHARE * error.resolution)
-    wanted = survey.passes * (error.sampling / target) ** 2
-    return min(2 * ceil((wanted - survey.passes) / 2), _MOST_PASSES)
+def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
+    """How many more passes, an even number, bring the total error to what is asked, or sampling to where it no longer
+    shows beside the rest. tried: how many passes there were at each fit, and the error they left.
+
+    The squared sampling error is a / passes + b. What is fixed, b, is the noise of the patches, which no pass lowers;
+    it is known from the second fit on.
+    """
+    passes, error = tried[-1]
+    rest = error.transport**2 + error.resolution**2
+    target = max(asked**2 - rest, _HIDDEN * rest)
+    sampling, fixed = error.sampling**2, 0.0
+    if sampling <= target:
+        return 0
+    if len(tried) > 1:
+        before, earlier = tried[-2]
+        falling = max(earlier.sampling**2 - sampling, 0.0) / (passes / before - 1.0)
+        fixed = max(sampling - falling, 0.0)
+    wanted = (sampling - fixed) / max(target - fixed, fixed, 1e-30)
+    return max(2 * ceil(passes * (min(wanted, _MOST_GROWTH) - 1.0) / 2.0), 0)
 
 
 def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:

@@ -43,7 +43,10 @@ def make_report(
         ],
         vertices=light.vertices,
         peak_memory_mb=peak_memory_mb(),
-        warnings=[*plan.scene.warnings, *_warnings(settings, light)],
+        warnings=[
+            *plan.scene.warnings,
+            *_warnings(settings, light, clock.elapsed, sum(len(o.triangles) for o in objects)),
+        ],
     )
 
 
@@ -53,20 +56,32 @@ def _mean_energy(halves: tuple[Transport, ...]) -> dict[str, float]:
     return {name: sum(ledger[name] for ledger in ledgers) / max(len(ledgers), 1) for name in names}
 
 
-def _warnings(settings: Settings, light: Light) -> list[str]:
+def _warnings(settings: Settings, light: Light, seconds: float, triangles: int) -> list[str]:
     warnings = []
-    if settings.error is not None and np.inf > light.error.total > 1.1 * settings.error:
+    total = light.error.total
+    if 1.0 < total < np.inf:
+        warnings.append(
+            "The estimated error is larger than the light itself: a few places are far brighter than all others, as "
+            "where a lamp touches a surface. The Error layer shows where; there only much smaller triangles help, or "
+            "moving the lamp away."
+        )
+    elif settings.error is not None and np.inf > total > 1.1 * settings.error:
         cause = max(("sampling", "transport", "resolution"), key=lambda name: getattr(light.error, name))
         remedy = {
-            "sampling": "allow more time",
+            "sampling": "allow more time, or ask for a smaller error, which makes all that is sampled finer",
             "transport": "ask for a smaller error, which makes the patches finer",
             "resolution": "use more and smaller triangles"
             if settings.tessellate
             else "subdivide the mesh, or do not keep it",
         }[cause]
         warnings.append(
-            f"The estimated error is {light.error.total:.1%}, more than the {settings.error:.1%} asked for; most of it "
+            f"The estimated error is {total:.1%}, more than the {settings.error:.1%} asked for; most of it "
             f"is {cause}: {remedy}."
+        )
+    if settings.seconds is not None and seconds > 1.1 * settings.seconds:
+        warnings.append(
+            f"The bake took {seconds:.1f} s, more than the {settings.seconds:.1f} s asked for: {triangles:,} triangles "
+            "take that long even with few rays. Allow more time, or simplify the meshes or bake fewer objects."
         )
     return warnings
 

@@ -118,7 +118,7 @@ def bake_once(
         seconds=seconds,
         processor=busy,
         **_errors(result.objects, reference),
-        stated=report.estimated_error["total"],
+        stated=report.estimated_error.get("total", float("nan")),
         embree=sum(inside),
         predicted=planned.seconds,
         predicted_mb=planned.memory_mb,

@@ -1,0 +1,140 @@
+"""What work costs on this machine: seconds from a few rays traced and numbers sorted here and now, memory from what is
+kept. The ratios were measured on the scenes of `make bench`; machines share them better than seconds.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from .parallel import Workers, thread_count
+from .patches import make_patches, split_objects, unit_space
+from .progress import Progress
+from .sampling import stream
+from .scene import Scene, SceneError
+from .visibility import Visibility
+
+#: Rays, and numbers, that measure how fast this machine is.
+_CALIBRATION = 1 << 15
+#: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers or looks for
+#: a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
+_LOOK, _FORM_FACTOR, _FIT = 24.0, 60.0, 1000.0
+#: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
+#: are split, and of a triangle that is there already.
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _OWN = 50.0, 900.0, 1500.0, 3300.0, 1300.0
+#: Bytes held at once for each cell, patch and triangle that is there already.
+_CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
+
+
+@dataclass(frozen=True)
+class Work:
+    """What a bake has to do. transport, gather, shadow: rays; cells: the triangles that light is fitted to; own: the
+    triangles that the scene itself has; fits: how often the light is fitted."""
+
+    transport: float = 0.0
+    gather: float = 0.0
+    shadow: float = 0.0
+    cells: float = 0.0
+    patches: float = 0.0
+    own: int = 0
+    fits: int = 1
+
+    @property
+    def memory_mb(self) -> float:
+        return (self.cells * _CELL_BYTES + self.patches * _PATCH_BYTES + self.own * _OWN_BYTES) / 1e6
+
+
+@dataclass(frozen=True)
+class Machine:
+    """How fast this machine is on one scene. ray: seconds that all threads together need for one; number: seconds that
+    one thread needs to sort one; closed: share of the rays that meet something."""
+
+    ray: float
+    number: float
+    closed: float
+    threads: int
+
+    def seconds(self, work: Work) -> float:
+        looks, factors = work.gather + work.shadow, work.transport * self.closed
+        shared = looks * _LOOK + factors * _FORM_FACTOR + work.cells * work.fits * _FIT
+        alone = factors * _BALANCE + work.cells * (work.fits * _ASSEMBLE + _SPLIT_CELL)
+        alone += work.patches * _SPLIT_PATCH + work.own * _OWN
+        return self.ray * (looks + work.transport) + self.number * (shared / self.threads + alone)
+
+
+def calibrate(scene: Scene, threads: int) -> Machine:
+    """Trace a few thousand rays on as many threads as the bake will have (0: all)."""
+    threads = thread_count(threads)
+    patches = make_patches(scene, unit_space(scene), split_objects(scene, 2048))
+    visibility = Visibility(patches.corners)
+    rng = stream(0, "calibration")
+    chosen = rng.choice(len(patches.area), size=_CALIBRATION, p=patches.area / patches.area.sum())
+    directions = rng.normal(size=(_CALIBRATION, 3)) + 1.5 * patches.normals[chosen]
+    origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
+    rays = origins.astype(np.float32), directions.astype(np.float32)
+    numbers = rng.random(_CALIBRATION)
+    met = np.mean(visibility.nearest(*rays) >= 0)
+    with Workers(threads, Progress()) as workers:
+        traced = _fastest(lambda: list(workers.map(lambda *_: visibility.nearest(*rays), threads, 1)))
+    ordered = _fastest(lambda: np.sort(numbers))
+    return Machine(traced / (threads * _CALIBRATION), ordered / _CALIBRATION, float(met), threads)
+
+
+def _fastest(work: Callable[[], object]) -> float:
+    """Seconds of the fastest of three times: the first pays for memory, and another may be disturbed."""
+    took = []
+    for _ in range(3):
+        begun = perf_counter()
+        work()
+        took.append(perf_counter() - begun)
+    return min(took)
+
+
+def refuse_without_room(memory_mb: float) -> None:
+    """Raise SceneError if a bake that will hold so much more than now would not fit into memory."""
+    free = free_memory_mb()
+    if free is not None and memory_mb > free:
+        raise SceneError(
+            f"This bake would need about {memory_mb:,.0f} MB of memory, and {free:,.0f} MB are free: ask for fewer "
+            "triangles or a larger error, or close other programs."
+        )
+
+
+def free_memory_mb() -> float | None:
+    """How much memory this process may still take, in MB; None where the system does not tell."""
+    if hasattr(ctypes, "windll"):
+        return _free_on_windows()
+    table = Path("/proc/meminfo")
+    if table.exists():
+        lines = dict(line.split(":", 1) for line in table.read_text(encoding="ascii").splitlines())
+        return float(lines["MemAvailable"].split()[0]) / 1e3 if "MemAvailable" in lines else None
+    # macOS tells the size of all memory; what others hold of it, it can compress or swap out.
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e6
+    except (ValueError, OSError):
+        return None
+
+
+class _MemoryStatus(ctypes.Structure):
+    """MEMORYSTATUSEX of the Windows API."""
+
+    _fields_ = (
+        ("length", ctypes.c_ulong),
+        ("load", ctypes.c_ulong),
+        *(
+            (name, ctypes.c_ulonglong)
+            for name in ("total", "free", "total_page", "free_page", "all", "rest", "extended")
+        ),
+    )
+
+
+def _free_on_windows() -> float | None:
+    status = _MemoryStatus(length=ctypes.sizeof(_MemoryStatus))
+    kernel = getattr(ctypes, "windll").kernel32  # noqa: B009 - only Windows has it, and mypy runs elsewhere
+    return status.free / 1e6 if kernel.GlobalMemoryStatusEx(ctypes.byref(status)) else None
