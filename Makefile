@@ -6,11 +6,12 @@
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
 # make accuracy    measure the samples against Cycles, for docs/accuracy.md: takes long
+# make bench       measure speed and honesty on six scenes beside Cycles, for docs/speed.md: takes 20 minutes
 # make effects     measure every effect against Cycles, for docs/effects.md
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-3.13 test-4.5 lint samples extension repository accuracy effects test-gui clean
+.PHONY: bake test test-3.13 test-4.5 lint samples extension repository accuracy bench effects test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
@@ -55,6 +56,9 @@ samples: .venv-4.5/ready
 
 accuracy: .venv/ready
 	.venv/bin/python docs/measure.py
+
+bench: .venv/ready
+	.venv/bin/python -m radiosity_baker.docs.bench
 
 effects: .venv/ready
 	.venv/bin/python -m radiosity_baker.docs.effects

@@ -75,7 +75,8 @@ def calibrate(scene: Scene, threads: int) -> Machine:
     visibility = Visibility(patches.corners)
     rng = stream(0, "calibration")
     chosen = rng.choice(len(patches.area), size=_CALIBRATION, p=patches.area / patches.area.sum())
-    directions = rng.normal(size=(_CALIBRATION, 3)) + 1.5 * patches.normals[chosen]
+    directions = rng.normal(size=(_CALIBRATION, 3))
+    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True) + patches.normals[chosen]
     origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
     rays = origins.astype(np.float32), directions.astype(np.float32)
     numbers = rng.random(_CALIBRATION)

@@ -27,8 +27,8 @@ _FEWEST = 1500
 #: Choosing among many emitting triangles costs as much as this many lamps.
 _TREE_COST = 8
 #: Relative errors that sampling leaves after two passes, and the triangles, with as many rays and on as many cells as
-#: named: typical of the scenes of `make bench`. Sampling falls with the cube root of the cells, since neighbours share what they learn;
-#: resolution with the square root.
+#: named: typical of the scenes of `make bench`. Sampling falls with the cube root of the cells, since neighbours share
+#: what they learn; resolution with the square root.
 _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0.01, 32, 20_000
 #: Errors that the panel shows the price of.
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)

@@ -116,21 +116,24 @@ def report(results: dict[str, Any]) -> str:
 
 
 def _ratios(scenes: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
-    head, rows = ["scene", "triangles"], []
+    head: list[str] = []
+    rows: list[list[str]] = []
+    every: list[list[float]] = []
     for name, (_, ours, rivals) in scenes.items():
         row, wins = [_plain(name), f"{rivals[0].triangles:,}"], []
         for rival in rivals:
             wins += [(f"{m} of {rival.name}", sooner(ours, rival, m)) for m in ("noise", "surface")]
-        rows.append([*row, *(f"{win:.0f}" for _, win in wins)])
+        every.append([win for _, win in wins])
+        rows.append([*row, *(_times(win) for win in every[-1])])
         head = ["scene", "triangles", *(title for title, _ in wins)]
-    values = np.array([[float(cell) for cell in row[2:]] for row in rows])
-    rows.append(["**median**", "", *(f"{win:.0f}" for win in np.nanmedian(values, axis=0))])
+    # None as good is the slowest there can be: it counts as zero.
+    rows.append(["**median**", "", *(_times(win) for win in np.median(np.nan_to_num(every), axis=0))])
     return head, rows
 
 
 def _runs(scenes: dict[str, Any], threads: int) -> tuple[list[str], list[list[str]]]:
-    head = ["scene", "bake", "triangles", "patches", "Mrays", "seconds", "processor s", "of Embree alone", "predicted s",
-            "noise", "surface error", "typical", "bias", "stated", "stated / true"]  # fmt: skip
+    head = ["scene", "bake", "triangles", "patches", "Mrays", "seconds", "processor s", "of Embree alone",
+            "predicted s", "noise", "surface error", "typical", "bias", "stated", "stated / true"]  # fmt: skip
     rows = []
     for name, (_, ours, rivals) in scenes.items():
         for run in [*ours, *rivals]:
@@ -183,6 +186,10 @@ def _original(runs: Sequence[Run]) -> tuple[list[str], list[list[str]]]:
 def _table(head: list[str], rows: list[list[str]]) -> str:
     lines = [head, ["---"] * len(head), *rows]
     return "".join(f"| {' | '.join(cells)} |\n" for cells in lines)
+
+
+def _times(win: float) -> str:
+    return f"{win:.3g}" if win > 0.0 else ""
 
 
 def _plain(name: str) -> str:

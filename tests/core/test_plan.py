@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, gather_rays, plan
+from radiosity_baker.core.plan import LOOKING, gather_rays, plan, price_of_accuracy
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
@@ -144,9 +145,39 @@ def test_cost_is_positive_and_grows_with_what_is_asked(build):
     assert finer.effort.patches > plan(room, Settings(error=0.05)).effort.patches
 
 
-def test_asked_seconds_are_what_the_plan_says(build):
-    assert plan(build.furnished_room(), Settings(error=None, seconds=3.5)).seconds == 3.5
-    assert plan(build.furnished_room(), Settings(error=0.02, seconds=1e-6)).seconds == 1e-6
+def test_asked_seconds_are_what_the_plan_says_where_that_is_possible(build):
+    room = build.furnished_room()
+    assert plan(room, Settings(error=None, seconds=3.5)).seconds == 3.5
+    hurried = plan(room, Settings(error=0.02, seconds=1e-6))
+    assert hurried.seconds > 1e-6
+    assert hurried.effort.triangles >= 1500
+
+
+def test_less_time_makes_less_of_everything_but_what_the_mesh_has(build, monkeypatch):
+    """A machine of a fixed speed, so that other programs have no say."""
+    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 1e-8, 1.0, 1))
+    dense = Scene((build.sphere(level=5, inward=True),), (build.grey,), (LAMPS["point lamps"],))
+    free, hurried = plan(dense, Settings()), plan(dense, Settings(error=None, seconds=0.7))
+    assert free.seconds > 1.0
+    assert hurried.seconds == 0.7
+    for name in ("triangles", "patches", "transport_rays", "gather_rays", "boundary_passes"):
+        assert getattr(hurried.effort, name) < getattr(free.effort, name)
+    assert hurried.cells >= len(dense.objects[0].triangles)
+    one, two = (plan(dense, Settings(error=None, seconds=s)).effort for s in (0.5, 0.7))
+    assert one.gather_rays <= two.gather_rays
+
+
+def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, monkeypatch):
+    calls = []
+    monkeypatch.setattr(
+        "radiosity_baker.core.plan.calibrate", lambda *_: calls.append(1) or Machine(3e-7, 1e-8, 1.0, 1)
+    )
+    prices = price_of_accuracy(build.furnished_room(), Settings(error=None, seconds=5.0))
+    assert len(calls) == 1
+    seconds = [prices[error].seconds for error in sorted(prices, reverse=True)]
+    assert seconds == sorted(seconds)
+    assert seconds[-1] > 2 * seconds[0]
+    assert prices[0.01].seconds == plan(build.furnished_room(), Settings(error=0.01)).seconds
 
 
 def test_the_asked_estimator_is_used(build):
