@@ -34,6 +34,8 @@ _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6
+#: What finding where light bends takes for each cell in the end: rays, and fits.
+_BEND_RAYS, _BEND_FITS = 100, 2
 #: Each step of thrift leaves this share of the work.
 _THRIFT, _MOST_THRIFT = 0.8, 24
 
@@ -150,26 +152,36 @@ class _Prices:
 
     def of(self, effort: Effort) -> Plan:
         """The plan with its cells, seconds and memory filled in."""
-        if effort.triangles not in self._cells:
-            self._cells[effort.triangles] = self._count(effort.triangles)
-        unpriced = replace(self._unpriced, effort=effort, cells=self._cells[effort.triangles])
+        unpriced = replace(self._unpriced, effort=effort, cells=self._count(effort.triangles))
         works = self._works(unpriced)
         costs = {name: self._machine.seconds(work) for name, work in works.items()}
         memory = sum(work.memory_mb for work in works.values())
         return replace(unpriced, costs=costs, seconds=sum(costs.values()), memory_mb=memory)
 
     def _count(self, triangles: int) -> int:
-        receivers = self._unpriced.scene.receivers()
-        vertices, own = [o.vertices for o in receivers], [o.triangles for o in receivers]
-        edge = self._settings.size or edge_for_count(vertices, own, triangles)
-        return predicted_count(vertices, own, edge)
+        """How many triangles the receivers have when about so many of one size would cover them."""
+        if triangles not in self._cells:
+            receivers = self._unpriced.scene.receivers()
+            vertices, own = [o.vertices for o in receivers], [o.triangles for o in receivers]
+            edge = self._settings.size or edge_for_count(vertices, own, triangles)
+            self._cells[triangles] = predicted_count(vertices, own, edge)
+        return self._cells[triangles]
+
+    def _adapted(self, planned: Plan) -> float:
+        """Cells after adaptation: where they are put where light calls for them, in inverse proportion to the asked
+        error; else those there are, and more along its boundaries."""
+        effort = planned.effort
+        if effort.coarsest > 1.0:
+            called = _TYPICAL_CELLS * _TYPICAL_RESOLUTION / (0.7 * effort.error)
+            return self._count(max(int(effort.triangles / effort.coarsest), 1)) + min(called, effort.triangles)
+        return planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
         effort, scene = planned.effort, planned.scene
-        # Boundaries of light take about as many more cells as the error asked for is small, up to what is allowed.
-        cells = planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
+        cells = self._adapted(planned)
         passes = self._passes(effort, cells)
+        looked, trials = (_BEND_RAYS, _BEND_FITS) if effort.coarsest > 1.0 else (0, 0)
         patches = _MORE_PATCHES * effort.patches if planned.looks_around else 0.0
         pieces = self._pieces
         if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
@@ -183,9 +195,11 @@ class _Prices:
         if planned.looks_around:
             # One look serves all that it may meet: it counts for the first of them.
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
-            look = Work(2 * patches * effort.transport_rays, cells * passes * effort.gather_rays, patches=patches)
+            look = Work(
+                2 * patches * effort.transport_rays, cells * (passes * effort.gather_rays + looked), patches=patches
+            )
             works[first] = replace(look, shadow=works[first].shadow) if first in works else look
-        return {**works, REST: Work(cells=cells, own=self._own, fits=1 if passes <= effort.passes else 2)}
+        return {**works, REST: Work(cells=cells, own=self._own, fits=trials + (1 if passes <= effort.passes else 2))}
 
     def _passes(self, effort: Effort, cells: float) -> float:
         if self._settings.error is None:
