@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.result import BakedObject, BakeResult
 from ..core.scene import Float32, SceneError
+from .colour_storage import EXPOSURE_KEY, MeshCorners, Storage, cut_off_warning, encode, note_factors
 from .copies import put_copies, remove_copies, replace_mesh
 from .receiver_source import ReceiverSource
 from .render_visibility import shown_as_rendered
@@ -24,6 +25,8 @@ ResultMode = Literal["new", "replace", "keep"]
 
 #: Custom property of a mesh: which of its colour attributes this add-on wrote, name to layer.
 OURS_KEY = "radiosity_baker"
+#: The light itself, corner by corner.
+FLOATS = Storage()
 #: How long the originals are read before Blender may draw.
 _READING_SECONDS = 0.02
 
@@ -63,9 +66,12 @@ def write(
     *,
     result_mode: ResultMode,
     attribute: str = "Radiosity",
+    storage: Storage = FLOATS,
 ) -> list[bpy.types.Object]:
     """Write the light and return the objects that carry it: all steps of `writing` at once."""
-    return at_once(writing(context.view_layer, result, sources, result_mode=result_mode, attribute=attribute))
+    return at_once(
+        writing(context.view_layer, result, sources, result_mode=result_mode, attribute=attribute, storage=storage)
+    )
 
 
 def writing(
@@ -75,8 +81,10 @@ def writing(
     *,
     result_mode: ResultMode,
     attribute: str = "Radiosity",
+    storage: Storage = FLOATS,
 ) -> Steps[list[bpy.types.Object]]:
-    """Steps that write the light, to the objects that carry it. Fills result.report.objects in.
+    """Steps that write the light, to the objects that carry it. Fills result.report.objects in, and warns of light that
+    the storage had to cut off.
 
     keep: the corners of the object's own mesh. replace: the object gets a tessellated mesh of its own; the old mesh
     stays with its other users. new: a tessellated copy with modifiers applied, in the collection "Radiosity Bake"; the
@@ -90,19 +98,29 @@ def writing(
     layers = list(result.objects[0].layers) if result.objects else []
     check_writable(objects, layers, result_mode=result_mode, attribute=attribute)
     receivers = [_Receiver(obj, source, baked[source.name]) for obj, source in zip(objects, sources, strict=True)]
+    brightest: list[float] = []
     if result_mode == "keep":
         values = []
         for receiver in receivers:
-            _check_unchanged(receiver.object, receiver.object.data, receiver.source)
-            values.append((yield partial(_kept_corners, receiver, len(receiver.object.data.loops))))
+            mesh = receiver.object.data
+            _check_unchanged(receiver.object, mesh, receiver.source)
+            light = yield partial(_kept_corners, receiver, len(mesh.loops))
+            values.append((yield from _encoded(mesh, light, storage, brightest)))
         for receiver, layers_of in zip(receivers, values, strict=True):
-            _paint(receiver.object.data, layers_of, attribute)
+            _paint(receiver.object.data, layers_of, attribute, storage)
         remove_copies(view_layer, objects)
         written = objects
     else:
         meshes: list[bpy.types.Mesh] = []
         try:
-            yield from _tessellate(view_layer, receivers, meshes, result_mode=result_mode, attribute=attribute)
+            for original, receiver in (yield from _read(view_layer, receivers, result_mode, attribute)):
+                mesh = yield from build_mesh(original, receiver.source, receiver.baked)
+                meshes.append(mesh)
+                turn = [0, 2, 1] if receiver.source.flipped else [0, 1, 2]
+                light = {name: values[:, turn].reshape(-1, 3) for name, values in receiver.baked.layers.items()}
+                stored = yield from _encoded(mesh, light, storage, brightest)
+                _paint(mesh, stored, attribute, storage)
+                yield breathe
         except BaseException:
             bpy.data.batch_remove(meshes)
             raise
@@ -110,6 +128,7 @@ def writing(
         written = put(view_layer, objects, meshes)
         view_layer.update()
     result.report.objects[:] = [_entry(obj, attribute) for obj in written]
+    result.report.warnings += cut_off_warning(brightest, storage)
     return written
 
 
@@ -120,26 +139,26 @@ class _Receiver:
     baked: BakedObject
 
 
-def _tessellate(
-    view_layer: bpy.types.ViewLayer,
-    receivers: Sequence[_Receiver],
-    meshes: list[bpy.types.Mesh],
-    *,
-    result_mode: ResultMode,
-    attribute: str,
-) -> Steps[None]:
-    """Fill `meshes` with a new one for each receiver, which no object uses yet."""
+def _read(
+    view_layer: bpy.types.ViewLayer, receivers: Sequence[_Receiver], result_mode: ResultMode, attribute: str
+) -> Steps[list[tuple[MeshData, _Receiver]]]:
+    """Each receiver with what its mesh holds now."""
     originals: list[MeshData] = []
     while len(originals) < len(receivers):
         originals += _read_some(view_layer, receivers[len(originals) :], result_mode, attribute)
         yield breathe
-    for receiver, original in zip(receivers, originals, strict=True):
-        mesh = yield from build_mesh(original, receiver.source, receiver.baked)
-        meshes.append(mesh)
-        turn = [0, 2, 1] if receiver.source.flipped else [0, 1, 2]
-        painted = {name: values[:, turn].reshape(-1, 3) for name, values in receiver.baked.layers.items()}
-        _paint(mesh, painted, attribute)
-        yield breathe
+    return list(zip(originals, receivers, strict=True))
+
+
+def _encoded(
+    mesh: bpy.types.Mesh, light: dict[str, Float32], storage: Storage, brightest: list[float]
+) -> Steps[dict[str, Float32]]:
+    """What the attributes of a mesh will hold of its corners' light; adds the brightest value that was cut off."""
+    if storage == FLOATS:
+        return light
+    stored, most = yield partial(encode, light, MeshCorners.of(mesh), storage)
+    brightest.append(most)
+    return stored
 
 
 def _read_some(
@@ -181,8 +200,8 @@ def _kept_corners(receiver: _Receiver, count: int) -> dict[str, Float32]:
     return layers
 
 
-def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> None:
-    """Write (corners, 3) values of each layer into colour attributes of their own, the combined one active.
+def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str, storage: Storage) -> None:
+    """Write encoded values (n, 3) of each layer into colour attributes of their own, the combined one active.
 
     Layers that an earlier bake has left and this one has not are taken away: their light is out of date.
     """
@@ -190,11 +209,11 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
     for layer, values in layers.items():
         name = attribute_name(attribute, layer)
         target = mesh.color_attributes.get(name)
-        if target is not None and (target.domain, target.data_type) != ("CORNER", "FLOAT_COLOR"):
+        if target is not None and (target.domain, target.data_type) != (storage.domain, storage.data_type):
             mesh.color_attributes.remove(target)
             target = None
         if target is None:
-            target = mesh.color_attributes.new(name, "FLOAT_COLOR", "CORNER")
+            target = mesh.color_attributes.new(name, storage.data_type, storage.domain)
         rgba = np.ones((len(values), 4), np.float32)
         rgba[:, :3] = values
         target.data.foreach_set("color", rgba.ravel())
@@ -205,6 +224,7 @@ def _paint(mesh: bpy.types.Mesh, layers: dict[str, Float32], attribute: str) -> 
             if stale in mesh.color_attributes:
                 mesh.color_attributes.remove(mesh.color_attributes[stale])
     mesh[OURS_KEY] = ours
+    note_factors(mesh, {attribute_name(attribute, layer): storage.factor(layer) for layer in layers})
     shown = attribute if "combined" in layers else attribute_name(attribute, next(iter(layers)))
     mesh.color_attributes.active_color_name = shown
     mesh.color_attributes.render_color_index = mesh.color_attributes.find(shown)
@@ -216,9 +236,10 @@ def remove_layers(mesh: bpy.types.Mesh) -> None:
     for name in dict(mesh.get(OURS_KEY) or {}):
         if name in mesh.color_attributes:
             mesh.color_attributes.remove(mesh.color_attributes[name])
-    if OURS_KEY in mesh:
-        del mesh[OURS_KEY]
-        mesh.update()
+    for key in (OURS_KEY, EXPOSURE_KEY):
+        if key in mesh:
+            del mesh[key]
+    mesh.update()
 
 
 def _put_meshes(

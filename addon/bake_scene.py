@@ -15,7 +15,8 @@ from ..core.plan import Effort
 from ..core.progress import Progress
 from ..core.result import BakeResult
 from ..core.settings import Settings
-from .attribute_writer import ResultMode, check_writable, write
+from .attribute_writer import FLOATS, ResultMode, check_writable, write
+from .colour_storage import Storage
 from .copies import ORIGINAL_KEY
 from .scene_reader import read_scene
 
@@ -27,6 +28,7 @@ def bake_objects(
     *,
     result_mode: ResultMode,
     attribute: str,
+    storage: Storage = FLOATS,
     progress: Progress | None = None,
     effort: Effort | None = None,
     memory: Memory | None = None,
@@ -43,7 +45,7 @@ def bake_objects(
     read = perf_counter()
     result = bake(scene, settings, progress, effort, memory=memory)
     baked = perf_counter()
-    written = write(context, result, sources, result_mode=result_mode, attribute=attribute)
+    written = write(context, result, sources, result_mode=result_mode, attribute=attribute, storage=storage)
     done = perf_counter()
     result.report.seconds.update(read=read - begun, write=done - baked, total=done - begun)
     return result, written
@@ -57,6 +59,7 @@ def bake_frames(
     *,
     result_mode: ResultMode,
     attribute: str,
+    storage: Storage = FLOATS,
     progress: Progress | None = None,
 ) -> tuple[BakeResult, list[bpy.types.Object]]:
     """Bake the light of each frame into layers of its own: `<attribute> 0001` and so on.
@@ -74,6 +77,7 @@ def bake_frames(
             settings,
             result_mode=result_mode,
             attribute=frame_attribute(attribute, frames[0]),
+            storage=storage,
             progress=progress,
         )
         memory = Memory()
@@ -86,10 +90,13 @@ def bake_frames(
                     replace(settings, tessellate=False),
                     result_mode="keep",
                     attribute=frame_attribute(attribute, frame),
+                    storage=storage,
                     progress=progress,
                     memory=memory,
                 )
                 first.report.objects += result.report.objects
+                told = first.report.warnings
+                told += [warning for warning in result.report.warnings if warning not in told]
                 for stage, seconds in result.report.seconds.items():
                     first.report.seconds[stage] = first.report.seconds.get(stage, 0.0) + seconds
     finally:

@@ -31,6 +31,7 @@ from ..core.settings import LAYERS, Settings
 from . import accuracy_plot, accuracy_report, properties, wording
 from .accuracy import Asked, measure
 from .bake_scene import bake_frames, bake_objects, frame_attribute
+from .colour_storage import DataType, Domain, Storage
 from .preview import render_preview
 from .scene_reader import pick_receivers, read_scene
 
@@ -38,6 +39,10 @@ SUCCESS, FAILED, UNUSABLE, INTERRUPTED = 0, 1, 2, 130
 
 #: Triangles of the middle of the accuracy ladder.
 _TRIANGLES = 20_000
+
+#: Names of where and how attributes hold colours.
+_DOMAINS: dict[str, Domain] = {"corner": "CORNER", "point": "POINT"}
+_DATA_TYPES: dict[str, DataType] = {"float": "FLOAT_COLOR", "byte": "BYTE_COLOR"}
 
 MANIFEST = Path(__file__).resolve().parent.parent / "blender_manifest.toml"
 
@@ -96,7 +101,12 @@ def _bake(options: argparse.Namespace, progress: Progress) -> None:
     source = _open(options.input)
     compress = _is_compressed(source)
     receivers = pick_receivers(bpy.context.scene, bpy.context.view_layer, options.objects)
-    how = {"result_mode": options.result, "attribute": options.attribute, "progress": progress}
+    how = {
+        "result_mode": options.result,
+        "attribute": options.attribute,
+        "storage": Storage(_DOMAINS[options.domain], _DATA_TYPES[options.type], options.exposure),
+        "progress": progress,
+    }
     shown = options.attribute
     if options.frames:
         result, baked = bake_frames(bpy.context, receivers, _settings(options), options.frames, **how)
@@ -327,6 +337,11 @@ def _parser() -> argparse.ArgumentParser:
     bake.set_defaults(command=_bake)
     bake.add_argument("--output", type=_file(".blend"), required=True, metavar="OUT.blend", help="the baked file")
     bake.add_argument("--attribute", default="Radiosity", help="name of the colour attribute (Radiosity)")
+    bake.add_argument("--domain", choices=_DOMAINS, default="corner", help="what has a colour of its own (corner)")
+    bake.add_argument("--type", choices=_DATA_TYPES, default="float", help="floats, or bytes from 0 to 1 (float)")
+    bake.add_argument(
+        "--exposure", type=_stops, default=0.0, metavar="STOPS", help="make the light brighter before it is stored (0)"
+    )
     bake.add_argument(
         "--frames",
         type=_frames,
@@ -449,6 +464,13 @@ def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text} is not a number above 0")
+    return value
+
+
+def _stops(text: str) -> float:
+    value = float(text)
+    if not -32.0 <= value <= 32.0:
+        raise argparse.ArgumentTypeError(f"{text} is not between -32 and 32")
     return value
 
 

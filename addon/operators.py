@@ -75,6 +75,7 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
             asked.to_core(),
             result_mode=asked.result_mode(),
             attribute=asked.attribute,
+            storage=asked.storage(),
             progress=Progress(),
         )
         self._conclude(context, result)

@@ -10,6 +10,7 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, Po
 from ..core import settings as core
 from . import viewport
 from .checklist import Problem
+from .colour_storage import Storage
 
 LAYER_ITEMS = [
     ("combined", "Combined", "Emitted plus reflected light: what the surface looks like"),
@@ -42,6 +43,16 @@ ESTIMATOR_ITEMS = [
     ("hemisphere", "Hemisphere", "Cast rays over each patch's hemisphere: cost grows in line with the patches"),
     ("analytic", "Analytic", "Lambert's exact formula for every pair of patches: smooth, for small scenes"),
     ("centroid", "Centroid", "The classic formula between centres: wrong where surfaces meet, for comparison only"),
+]
+
+DOMAIN_ITEMS = [
+    ("CORNER", "Face Corner", "A colour for each corner of each face: edges stay sharp"),
+    ("POINT", "Vertex", "A colour for each vertex, the mean of the corners that meet there"),
+]
+
+DATA_TYPE_ITEMS = [
+    ("FLOAT_COLOR", "Color", "Floats: any brightness"),
+    ("BYTE_COLOR", "Byte Color", "8 bits for each channel: a quarter of the memory, and light above 1 is cut off"),
 ]
 
 
@@ -170,6 +181,29 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         default="Radiosity",
         maxlen=50,
     )
+    domain: EnumProperty(
+        name="Domain",
+        description="What has a colour of its own",
+        items=DOMAIN_ITEMS,
+        default="CORNER",
+    )
+    data_type: EnumProperty(
+        name="Data Type",
+        description="How the colours are stored",
+        items=DATA_TYPE_ITEMS,
+        default="FLOAT_COLOR",
+    )
+    exposure: FloatProperty(
+        name="Exposure",
+        description="Stops by which the light is made brighter before it is stored; the mesh keeps the factor, to "
+        "divide by",
+        default=0.0,
+        soft_min=-10.0,
+        soft_max=10.0,
+        min=-32.0,
+        max=32.0,
+        precision=1,
+    )
     show_while_baking: BoolProperty(
         name="Show While Baking",
         description="Show the light in the viewport as far as it has come, pass by pass",
@@ -218,6 +252,10 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
             layers=tuple(layer for layer in core.LAYERS if layer == "combined" or layer in self.layers),
             effects=self.effects(),
         )
+
+    def storage(self) -> Storage:
+        """How the colour attributes hold the light."""
+        return Storage(self.domain, self.data_type, self.exposure)
 
     def effects(self) -> dict[str, bool]:
         """The effects that a person has switched on or off, by name."""

@@ -46,6 +46,9 @@ GERMAN = {
     "Layers": "Ebenen",
     "Layer": "Ebene",
     "Attribute": "Attribut",
+    "Domain": "Bereich",
+    "Data Type": "Datentyp",
+    "Exposure": "Belichtung",
     "Show While Baking": "Während des Backens zeigen",
     "Show When Done": "Am Ende zeigen",
     "Report": "Bericht",
@@ -71,7 +74,22 @@ GERMAN = {
     "Hemisphere": "Halbkugel",
     "Analytic": "Analytisch",
     "Centroid": "Schwerpunkt",
+    "Face Corner": "Flächenecke",
+    "Vertex": "Punkt",
+    "Color": "Farbe",
+    "Byte Color": "Byte-Farbe",
     # Tooltips
+    "A colour for each corner of each face: edges stay sharp": "Eine Farbe für jede Ecke jeder Fläche: Kanten bleiben "
+    "scharf",
+    "A colour for each vertex, the mean of the corners that meet there": "Eine Farbe für jeden Punkt, das Mittel der "
+    "Ecken dort",
+    "Floats: any brightness": "Gleitkommazahlen: jede Helligkeit",
+    "8 bits for each channel: a quarter of the memory, and light above 1 is cut off": "8 Bit je Kanal: ein Viertel des "
+    "Speichers, und Licht über 1 wird abgeschnitten",
+    "What has a colour of its own": "Was eine eigene Farbe hat",
+    "How the colours are stored": "Wie die Farben gespeichert werden",
+    "Stops by which the light is made brighter before it is stored; the mesh keeps the factor, to divide "
+    "by": "Blendenstufen, um die das Licht vor dem Speichern heller wird; das Netz merkt sich den Faktor zum Teilen",
     "Emitted plus reflected light: what the surface looks like": "Abgegebenes und reflektiertes Licht: wie die "
     "Fläche aussieht",
     "The light that arrives, without the surface's own colour": "Das einfallende Licht, ohne die Farbe der Fläche",

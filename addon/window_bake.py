@@ -29,6 +29,7 @@ class WindowBake:
         asked = context.scene.radiosity_baker
         settings = asked.to_core()
         self._mode, self._attribute = asked.result_mode(), asked.attribute
+        self._storage = asked.storage()
         self._scene_uid = context.scene.session_uid
         receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
         attribute_writer.check_writable(receivers, settings.layers, result_mode=self._mode, attribute=self._attribute)
@@ -64,6 +65,7 @@ class WindowBake:
                         self._sources,
                         result_mode=self._mode,
                         attribute=self._attribute,
+                        storage=self._storage,
                     )
                 )
             return None

@@ -19,6 +19,9 @@ LAYERS = {
     "error": "estimated standard error of the combined radiance",
 }
 
+#: Layers that are no light: pictures of how the bake went.
+VIEWS: tuple[str, ...] = ()
+
 
 @dataclass(frozen=True)
 class Settings:

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from radiosity_baker.addon import command_line, preview
+from radiosity_baker.addon.colour_storage import EXPOSURE_KEY, Storage
 from radiosity_baker.addon.headless import main, register_command, unregister_command
 from radiosity_baker.core import self_test
 from radiosity_baker.core.result import BakeResult, Report
@@ -57,9 +58,10 @@ def bake(path: Path, out: Path, *more: str) -> int:
 def painted(monkeypatch: pytest.MonkeyPatch):
     """In place of a bake, for tests of what happens around it: every corner becomes grey."""
 
-    def paint(_context, objects, settings, *, result_mode, attribute, progress):
+    def paint(_context, objects, settings, *, result_mode, attribute, storage, progress):
         assert not settings.tessellate
         assert result_mode == "keep"
+        assert storage == Storage()
         for item in objects:
             values = item.data.color_attributes.new(attribute, "FLOAT_COLOR", "CORNER").data
             values.foreach_set("color", np.full(4 * len(values), 0.5, np.float32))
@@ -334,6 +336,15 @@ def test_goal_and_result_become_settings(monkeypatch, scene_file: Path, out: Pat
         Settings(error=0.1, tessellate=False, seed=7, threads=2),
         Settings(),
     ]
+
+
+def test_how_colours_are_stored_is_what_was_asked(scene_file: Path, out: Path):
+    assert bake(scene_file, out, "--domain", "point", "--type", "byte", "--exposure", "-2") == 0
+    bpy.ops.wm.open_mainfile(filepath=str(out / "baked.blend"))
+    mesh = bpy.data.objects["Floor"].data
+    stored = mesh.color_attributes["Radiosity"]
+    assert (stored.domain, stored.data_type) == ("POINT", "BYTE_COLOR")
+    assert dict(mesh[EXPOSURE_KEY]) == {"Radiosity": 0.25}
 
 
 def test_blender_runs_the_file_by_its_path(root: Path, scene_file: Path, out: Path):

@@ -33,7 +33,8 @@ def words(root):
         found |= {text.value for text in texts if isinstance(text, ast.Constant) and isinstance(text.value, str)}
     for items in (properties.LAYER_ITEMS, properties.GOAL_ITEMS, properties.RESULT_ITEMS, properties.DENSITY_ITEMS):
         found |= {text for _, *texts in items for text in texts}
-    found |= {text for _, *texts in properties.ESTIMATOR_ITEMS for text in texts}
+    for items in (properties.ESTIMATOR_ITEMS, properties.DOMAIN_ITEMS, properties.DATA_TYPE_ITEMS):
+        found |= {text for _, *texts in items for text in texts}
     found |= {name.capitalize() for name in presets.PRESETS} | {said for said, _ in presets.PRESETS.values()}
     found |= {button for button, _ in checklist.FIXES.values()} | set(checklist.SAID.values())
     # Words that are put together: nouns with their number, stages and causes of errors.
