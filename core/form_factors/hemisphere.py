@@ -153,12 +153,12 @@ def hemisphere_rows(
     cast = Counter(transport=len(look.side) * rays)
     if patches.optics is None:
         opening = Opening(look.escaped / counted, look.skylight / counted[:, None])
-        return Exchanged(sides, (_mutual(rows[0], sides.back),), opening, np.zeros(len(look.side)), None, cast)
+        return Exchanged(sides, (_mutual(rows[0], sides),), opening, np.zeros(len(look.side)), None, cast)
     opening = Opening((look.escaped.T / counted).T, look.skylight / counted[:, None])
     lost = 1.0 - opening.share - np.stack([r.row_sums() for r in rows], axis=1).reshape(opening.share.shape)
     glints = np.pi * look.glints / counted[:, None] if look.glints.any() else None
     cast += Counter({"onward": int(look.onward.sum()), "cut off": int(look.cut.sum())})
-    rows = tuple(_mutual(matrix, sides.back) for matrix in rows)
+    rows = tuple(_mutual(matrix, sides) for matrix in rows)
     return Exchanged(sides, rows, opening, np.maximum(lost, 0.0), glints, cast)
 
 
@@ -283,16 +283,19 @@ def _tinted_lengths(columns: Int32, tint: Float32 | None, escaped: int) -> tuple
     return length, column, hits, np.einsum("nk,nkc->nc", columns == escaped, weight)
 
 
-def _mutual(rows: Rows, back: Bool) -> Rows:
-    """Leave out what only one of a front and a back has seen: a back that lies inside a solid sees the part of a patch
-    that runs under it, and would lead the light of the open part inside."""
-    owner = rows.owners()
-    mixed = np.flatnonzero(back[owner] != back[rows.columns])
-    if not len(mixed):
+def _mutual(rows: Rows, sides: Sides) -> Rows:
+    """Leave out what a back sees of a front that lies under a solid in part, unless the front sees the back too: a back
+    inside that solid sees the part that is hidden, and would lead the light of the open part inside.
+
+    With few rays most sides that see each other are found from one of them only, so this is asked nowhere else.
+    """
+    partly, back = sides.hidden.any(axis=1), sides.back
+    owner, column = rows.owners(), rows.columns.astype(np.int64)
+    doubtful = np.flatnonzero(back[owner] & (partly & ~back)[column])
+    if not len(doubtful):
         return rows
-    i, j = owner[mixed], rows.columns[mixed].astype(np.int64)
-    alone = ~np.isin(i * len(rows) + j, j * len(rows) + i)
+    mutual = np.isin(owner[doubtful] * len(rows) + column[doubtful], column * len(rows) + owner)
     kept = np.ones(len(owner), dtype=bool)
-    kept[mixed[alone]] = False
+    kept[doubtful[~mutual]] = False
     length = np.bincount(owner[kept], minlength=len(rows))
     return Rows(np.concatenate([[0], np.cumsum(length)]).astype(np.int64), rows.columns[kept], rows.weights[kept])
