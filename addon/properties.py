@@ -20,6 +20,9 @@ LAYER_ITEMS = [
     ("emission", "Emission", "The light the surface gives off by itself"),
     ("sky", "Sky", "Reflected light that came straight from the sky"),
     ("error", "Error", "How far the combined light may be off, as the bake itself estimates it"),
+    ("unreached", "Unreached", "Loud colours where nothing is seen of the surface and light was filled in"),
+    ("escaped", "Escaped", "The share of what surrounds the surface that is open to the void: holes are bright"),
+    ("triangles", "Triangles", "A colour of its own for every triangle, to see how finely the surface is split"),
 ]
 
 GOAL_ITEMS = [

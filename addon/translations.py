@@ -65,6 +65,8 @@ GERMAN = {
     "Indirect": "Indirekt",
     "Emission": "Emission",
     "Sky": "Himmel",
+    "Unreached": "Unerreicht",
+    "Escaped": "Entkommen",
     "Accuracy": "Genauigkeit",
     "New Object": "Neues Objekt",
     "Replace": "Ersetzen",
@@ -100,6 +102,12 @@ GERMAN = {
     "Reflected light that came straight from the sky": "Reflektiertes Licht, das geradewegs vom Himmel kam",
     "How far the combined light may be off, as the bake itself estimates it": "Wie weit das Gesamtlicht daneben liegen "
     "kann, nach eigener Schätzung",
+    "Loud colours where nothing is seen of the surface and light was filled in": "Laute Farben, wo niemand die Fläche "
+    "sieht und Licht ergänzt wurde",
+    "The share of what surrounds the surface that is open to the void: holes are bright": "Der Anteil der Umgebung, "
+    "der ins Leere offen ist: Löcher sind hell",
+    "A colour of its own for every triangle, to see how finely the surface is split": "Eine eigene Farbe für jedes "
+    "Dreieck, um die Unterteilung zu sehen",
     "Bake until the estimated error is as small as asked": "Backen, bis der geschätzte Fehler klein genug ist",
     "Make the best of a given time": "Das Beste aus der gegebenen Zeit machen",
     "Leave the objects alone, and add a tessellated copy of each that carries the light": "Die Objekte in Ruhe lassen "

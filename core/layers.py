@@ -14,14 +14,18 @@ from .settings import LAYERS
 from .textured_fit import TexturedFit
 from .textures import constant_colours, varies
 
+#: Colours of vertices in the layer `unreached`.
+_REACHED, _FILLED, _HIDDEN = (0.05, 0.05, 0.05), (1.0, 0.0, 1.0), (1.0, 0.0, 0.0)
+#: Powers of the root of x^4 = x + 1, inverted: steps of the sequence that fills a cube most evenly.
+_R3 = 1.2207440846057596 ** -np.arange(1.0, 4.0)
 
-def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple[str, ...]) -> Iterator[BakedObject]:
-    """The receivers with the asked layers, radiance in W/(m^2 sr) at every corner.
+
+def baked_objects(receivers: Receivers, layers: Layers, names: tuple[str, ...]) -> Iterator[BakedObject]:
+    """The receivers with the asked layers, values at every corner.
 
     Raises SceneError for a layer that does not exist.
     """
-    layers = Layers(scene, receivers, light)
-    values = {name: layers.radiance(name) for name in names}
+    values = {name: layers.values(name) for name in names}
     for number, (receiver, mesh) in enumerate(zip(receivers.objects, receivers.meshes, strict=True)):
         part = slice(receivers.first[number], receivers.first[number + 1])
         yield BakedObject(
@@ -35,17 +39,20 @@ def baked_objects(scene: Scene, receivers: Receivers, light: Light, names: tuple
 
 
 class Layers:
-    """Fitted light, colour by colour and source by source."""
+    """Fitted light, colour by colour and source by source. escaped: asked for the share (v,) open to the void, if a
+    layer shows it."""
 
-    def __init__(self, scene: Scene, receivers: Receivers, light: Light) -> None:
+    def __init__(self, scene: Scene, receivers: Receivers, light: Light, escaped: Callable[[], Float64]) -> None:
         self._receivers = receivers
         self._light = light
+        self._escaped = escaped
         self._straight = light.lamps + light.emitted + light.sky
         self._colours = constant_colours(scene, receivers.element_surface)
         self._textured = TexturedFit(scene, receivers) if any(varies(scene, o) for o in receivers.objects) else None
 
-    def radiance(self, name: str) -> Float32:
-        """One layer (e, 3, 3) over all output triangles. Raises SceneError for a layer that does not exist."""
+    def values(self, name: str) -> Float32:
+        """One layer (e, 3, 3) over all output triangles, as settings.LAYERS describes it: radiance in W/(m^2 sr), or a
+        view of how the bake went. Raises SceneError for a layer that does not exist."""
         light, dark = self._light, np.zeros_like(self._light.sky)
         everything = self._straight + light.reflected
         layers: dict[str, Callable[[], Float64]] = {
@@ -56,6 +63,9 @@ class Layers:
             "emission": lambda: self._shown(dark, emits=True),
             "sky": lambda: self._shown(light.sky),
             "error": lambda: np.repeat(_standard_error(self._receivers, light)[:, :, None], 3, axis=2),
+            "unreached": lambda: _unreached(light)[self._receivers.corner_vertex],
+            "escaped": lambda: np.repeat(self._escaped()[self._receivers.corner_vertex][:, :, None], 3, axis=2),
+            "triangles": lambda: _own_colours(len(self._receivers.corner_vertex)),
         }
         if name not in layers:
             raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
@@ -80,3 +90,17 @@ def _standard_error(receivers: Receivers, light: Light) -> Float64:
     total = np.bincount(corner, weight * np.repeat(light.cell_error, 3), receivers.vertices)
     share = np.bincount(corner, weight, receivers.vertices)
     return np.asarray(np.sqrt(total / np.maximum(share, np.finfo(float).tiny)))[receivers.corner_vertex]
+
+
+def _unreached(light: Light) -> Float64:
+    """(v, 3): loud where the light of a vertex is not its own."""
+    colours = np.full((len(light.filled), 3), _REACHED)
+    colours[light.filled], colours[light.hidden] = _FILLED, _HIDDEN
+    return colours
+
+
+def _own_colours(count: int) -> Float64:
+    """(count, 3, 3): a colour for each triangle, far from those of the triangles before and after it: points of
+    Roberts' sequence R3 in the cube of colours."""
+    colours = (np.arange(count)[:, None] + 1) * _R3 % 1.0
+    return np.repeat(colours[:, None], 3, axis=1)

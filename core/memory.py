@@ -81,8 +81,8 @@ class Memory:
             for name in changes.keys() - last.responses.keys():
                 with clock.stage("relight", 0.1):
                     last.responses[name] = _response(last.baked, name, last.light.alphas, workers, rays)
-        rays.update(survey.rays)
         result = last.baked.result(_relit(last, changes), settings, clock)
+        rays.update(survey.rays)
         result.report.rays = {"total": rays.total(), **{purpose: count for purpose, count in rays.items() if count}}
         return result
 

@@ -15,7 +15,7 @@ from .parallel import Workers
 from .plan import Effort
 from .receivers import cell_colours
 from .reconstruction import Fit, Samples
-from .scene import Float64, Scene
+from .scene import Bool, Float64, Scene
 from .settings import Settings
 from .survey import Survey
 from .textures import Colours
@@ -31,9 +31,8 @@ class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
     reflected, sky, emitted, lamps (v, 3); alphas: the smoothing of direct and, if any, indirect light; error;
-    cell_error (c,) mean square of each cell's radiance error; vertices:
-    how many there are, how many no valid sample tells of and were filled from their neighbours, and how many lie so
-    deep inside solids that they stay dark.
+    cell_error (c,) mean square of each cell's radiance error. No valid sample tells of some vertices (v,): they were
+    filled from their neighbours, or are hidden so deep inside solids that they stay dark.
     """
 
     reflected: Float64
@@ -43,7 +42,8 @@ class Light:
     alphas: tuple[float, ...]
     error: ErrorEstimate
     cell_error: Float64
-    vertices: dict[str, int]
+    filled: Bool
+    hidden: Bool
 
 
 def refine(
@@ -127,12 +127,7 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     error, cell_error = estimate_error(
         fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, mean_radiance(survey, colours, fits)
     )
-    vertices = {
-        "all": receivers.vertices,
-        "filled": int(np.count_nonzero(fit.filled)),
-        "hidden": int(np.count_nonzero(fit.hidden & ~fit.filled)),
-    }
-    return _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), error, cell_error, vertices)
+    return _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), error, cell_error, fit)
 
 
 def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
@@ -143,7 +138,7 @@ def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
         both = halves[0] + halves[1]
         values.append(fit.solve_within(fit.system(both), alpha, both))
     dark = np.zeros(len(survey.receivers.cells))
-    return _light(survey, values, alphas, UNKNOWN, dark, {"all": survey.receivers.vertices})
+    return _light(survey, values, alphas, UNKNOWN, dark, fit)
 
 
 def average_light(survey: Survey) -> Light:
@@ -163,7 +158,7 @@ def average_light(survey: Survey) -> Light:
         return np.stack(channels, axis=1)
 
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-    return _light(survey, [mean(halves) for halves in sampled], (), UNKNOWN, np.zeros(len(cells)), {"all": count})
+    return _light(survey, [mean(halves) for halves in sampled], (), UNKNOWN, np.zeros(len(cells)), None)
 
 
 def _light(
@@ -172,10 +167,11 @@ def _light(
     alphas: tuple[float, ...],
     error: ErrorEstimate,
     cell_error: Float64,
-    vertices: dict[str, int],
+    fit: Fit | None,
 ) -> Light:
     """Vertex values (v, channels) of direct and, if any, indirect light, by where it came from."""
     around = survey.surroundings
+    nowhere = np.zeros(survey.receivers.vertices, dtype=bool)
     dark = np.zeros((survey.receivers.vertices, 3))
     reflected, sky, emitted = dark, dark, dark
     if around:
@@ -190,7 +186,8 @@ def _light(
         alphas=alphas,
         error=error,
         cell_error=cell_error,
-        vertices=vertices,
+        filled=fit.filled if fit else nowhere,
+        hidden=fit.hidden & ~fit.filled if fit else nowhere,
     )
 
 

@@ -41,7 +41,11 @@ def make_report(
             {"name": o.name, "attribute": "", "triangles": len(o.triangles), "corners": 3 * len(o.triangles)}
             for o in objects
         ],
-        vertices=light.vertices,
+        vertices={
+            "all": survey.receivers.vertices,
+            "filled": int(np.count_nonzero(light.filled)),
+            "hidden": int(np.count_nonzero(light.hidden)),
+        },
         peak_memory_mb=peak_memory_mb(),
         warnings=[
             *plan.scene.warnings,

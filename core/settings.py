@@ -17,10 +17,13 @@ LAYERS = {
     "emission": "emitted radiance",
     "sky": "reflected radiance that came straight from the sky",
     "error": "estimated standard error of the combined radiance",
+    "unreached": "grey; magenta where light was filled in from neighbours, red deep inside solids",
+    "escaped": "share of the hemisphere, weighted by the cosine, that is open to the void: no radiance, 0 to 1",
+    "triangles": "a colour of its own for every output triangle",
 }
 
 #: Layers that are no light: pictures of how the bake went.
-VIEWS: tuple[str, ...] = ()
+VIEWS = ("unreached", "escaped", "triangles")
 
 
 @dataclass(frozen=True)
