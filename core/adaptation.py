@@ -72,6 +72,7 @@ class Adaptation:
         )
         self._seed = seed
         self._workers = workers
+        self._mean = 0.0
 
     def refine_receivers(self, receivers: Receivers, limit: int, error: float, *, shadows: bool = True) -> Receivers:
         """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all.
@@ -119,19 +120,21 @@ class Adaptation:
         near_contact = np.flatnonzero(near)
         seen = []
         for k in range(count):
-            points = Points(cells, chosen, k, shift)
+            points = Points.of_pass(cells, chosen, k, shift)
             streams = _FIRST_STREAM + 100 * number + k
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
             direct = light.irradiance.mean(axis=1)
             hidden = np.zeros(len(chosen), dtype=bool)
             if self._around is not None and len(near_contact):
-                some = Points(cells, chosen[near_contact], k, shift)
+                some = Points.of_pass(cells, chosen[near_contact], k, shift)
                 arriving, _, enclosed, _ = gather_indirect(
                     some, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
                 )
-                grey = arriving[:, :-1] @ self._around.to_grey
+                total = arriving[:, :-1] @ self._around.to_grey + direct[near_contact]
+                if number == 0:
+                    self._mean = float(total.mean())
                 hidden[near_contact] = out_of_sight(
-                    some, self._around.hemispheres, enclosed, grey, direct[near_contact]
+                    some, self._around.hemispheres, enclosed, total, direct[near_contact], self._mean
                 )
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))

@@ -21,10 +21,15 @@ _CHUNK = 8192
 
 
 class Points:
-    """The sample points of one pass: the pass-th point of an even sequence in each cell, of the cells in `chosen`."""
+    """A point in each of the cells in `chosen`, at its barycentric weights (n, 3)."""
 
-    def __init__(self, cells: Cells, chosen: np.ndarray, number: int, shift: Float64) -> None:
-        self.weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
+    @classmethod
+    def of_pass(cls, cells: Cells, chosen: np.ndarray, number: int, shift: Float64) -> Points:
+        """The sample points of one pass: the pass-th point of an even sequence in each cell."""
+        return cls(cells, chosen, triangle_points(plane_points(np.full(len(chosen), number), shift[chosen])))
+
+    def __init__(self, cells: Cells, chosen: np.ndarray, weights: Float64) -> None:
+        self.weights = weights
         self.positions = np.einsum("nc,nck->nk", self.weights, cells.corners[chosen])
         self.normals = cells.normals[chosen]
         self.size = np.sqrt(2.0 * cells.area[chosen])

@@ -57,7 +57,7 @@ class Layers:
         everything = self._straight + light.reflected
         layers: dict[str, Callable[[], Float64]] = {
             "combined": lambda: self._shown(everything, emits=True),
-            "light": lambda: everything[self._receivers.corner_vertex] / np.pi,
+            "light": lambda: self._at_corners(everything) / np.pi,
             "direct": lambda: self._shown(self._straight),
             "indirect": lambda: self._shown(light.reflected),
             "emission": lambda: self._shown(dark, emits=True),
@@ -73,13 +73,23 @@ class Layers:
 
     def _shown(self, irradiance: Float64, *, emits: bool = False) -> Float64:
         """What (e, 3, 3) the surfaces make of the irradiance (v, 3) at the vertices, with or without what they emit."""
-        shown = self._colours.albedo[:, None] * irradiance[self._receivers.corner_vertex] / np.pi
+        shown = self._colours.albedo[:, None] * self._at_corners(irradiance) / np.pi
         if emits:
             shown = self._colours.emission[:, None] + shown
         if self._textured is not None:
             textured = self._textured.elements
             shown[textured] = self._textured.shown(irradiance, emits=emits)[textured]
+            buried = textured & self._light.buried
+            if buried.any():
+                shown[buried] = self._textured.shown(np.zeros_like(irradiance), emits=emits)[buried]
         return shown
+
+    def _at_corners(self, irradiance: Float64) -> Float64:
+        """Values (e, 3, 3) at the corners from those at the vertices (v, 3). A vertex where a surface goes out of sight
+        belongs to what is seen; the triangle on its other side is dark in spite of it."""
+        values = irradiance[self._receivers.corner_vertex]
+        values[self._light.buried] = 0.0
+        return values
 
 
 def _standard_error(receivers: Receivers, light: Light) -> Float64:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 from time import perf_counter
 
@@ -33,6 +33,7 @@ class Light:
     reflected, sky, emitted, lamps (v, 3); alphas: the smoothing of direct and, if any, indirect light; error;
     cell_error (c,) mean square of each cell's radiance error. No valid sample tells of some vertices (v,): they were
     filled from their neighbours, or are hidden so deep inside solids that they stay dark.
+    buried (e,): output triangles inside solids.
     """
 
     reflected: Float64
@@ -44,6 +45,7 @@ class Light:
     cell_error: Float64
     filled: Bool
     hidden: Bool
+    buried: Bool
 
 
 def refine(
@@ -127,7 +129,8 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     error, cell_error = estimate_error(
         fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, mean_radiance(survey, colours, fits)
     )
-    return _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), error, cell_error, fit)
+    values, alphas = [f.values for f in fits], tuple(f.alpha for f in fits)
+    return replace(_light(survey, values, alphas, error, cell_error, fit), buried=survey.buried())
 
 
 def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
@@ -188,6 +191,7 @@ def _light(
         cell_error=cell_error,
         filled=fit.filled if fit else nowhere,
         hidden=fit.hidden & ~fit.filled if fit else nowhere,
+        buried=np.zeros(len(survey.receivers.element_corners), dtype=bool),
     )
 
 

@@ -30,6 +30,10 @@ from .visibility import Visibility
 #: cell's size, one that gets less than half.
 _DARK, _DIM, _GAP = 0.05, 0.5, 0.25
 
+#: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
+#: sides, for what shows of it beside a straight outline has a corner.
+_BESIDES = np.concatenate([0.98 * np.eye(3) + 0.02 / 3, 0.49 * (1.0 - np.eye(3)) + 0.02 / 3])
+
 
 @dataclass(frozen=True, eq=False)
 class Surroundings:
@@ -89,19 +93,25 @@ def _table(half: Transport, sky: Sky, emitters: bool) -> Float32:
     return np.concatenate([table, off_mirrors])
 
 
-def out_of_sight(points: Points, hemispheres: Hemispheres, enclosed: Bool, indirect: Float64, direct: Float64) -> Bool:
+def out_of_sight(
+    points: Points, hemispheres: Hemispheres, enclosed: Bool, total: Float64, direct: Float64, mean: float
+) -> Bool:
     """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or in a gap that is
     much narrower than their cell, under what lies on the surface or nearly so.
 
     A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
-    reaches count. indirect, direct (n,): mean irradiance.
+    reaches count. total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total.
     """
-    total = indirect + direct
-    hidden = enclosed & (total <= _DARK * total.mean()) & (direct <= 0)
-    dim = np.flatnonzero(~hidden & (total <= _DIM * total.mean()) & (direct <= 0))
+    hidden = enclosed & dark(total, direct, mean)
+    dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
     if len(dim):
         hidden[dim] = hemispheres.covered(points.positions[dim], points.normals[dim], _GAP * points.size[dim])
     return np.asarray(hidden)
+
+
+def dark(total: Float64, direct: Float64, mean: float) -> Bool:
+    """Points (n,) that get next to nothing of the mean light, and nothing straight from the sources."""
+    return np.asarray((total <= _DARK * mean) & (direct <= 0))
 
 
 class Survey:
@@ -137,6 +147,7 @@ class Survey:
         self._shift = stream(seed, "cells").random((count, 2))
         self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
+        self._mean = 0.0
 
     @property
     def valid_samples(self) -> Float64:
@@ -147,7 +158,7 @@ class Survey:
         """One more point in every cell."""
         number = self.passes
         every = np.arange(len(self.receivers.cells))
-        points = Points(self.receivers.cells, every, number, self._shift)
+        points = Points.of_pass(self.receivers.cells, every, number, self._shift)
         light = self._direct(points, number)
         valid = np.ones(len(every), dtype=bool)
         if self.surroundings is not None:
@@ -168,8 +179,10 @@ class Survey:
         values = arriving[:, :columns]
         if number < 2:
             self.coarser[half] = arriving[:, columns] - values[:, :3].mean(axis=1)
-        grey = values @ around.to_grey
-        valid = ~out_of_sight(points, around.hemispheres, enclosed, grey, light.irradiance.mean(axis=1))
+        direct = light.irradiance.mean(axis=1)
+        total = values @ around.to_grey + direct
+        self._mean = float(total.mean())
+        valid = ~out_of_sight(points, around.hemispheres, enclosed, total, direct, self._mean)
         noise = (deviation[:, :columns] @ around.to_grey) ** 2
         self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
         return valid
@@ -183,10 +196,35 @@ class Survey:
         for _ in range(passes):
             # A number far from those of the full passes: the streams must differ, the points go on evenly.
             number = self.passes + self._extra
-            points = Points(self.receivers.cells, chosen, number, self._shift)
+            points = Points.of_pass(self.receivers.cells, chosen, number, self._shift)
             light = self._direct(points, 1_000_000 + self._extra)
             self._add_direct(self._extra, chosen, points, light, everywhere)
             self._extra += 1
+
+    def buried(self) -> Bool:
+        """Output triangles (e,) that lie inside a solid as a whole.
+
+        Of a triangle that is seen in part all samples may happen to be hidden, so it is looked at where that part would
+        be.
+        """
+        chosen = np.flatnonzero(self.invalid & (self.valid_samples == 0))
+        around = self.surroundings
+        for k, weights in enumerate(_BESIDES):
+            if around is None or not len(chosen):
+                break
+            points = Points(self.receivers.cells, chosen, np.broadcast_to(weights, (len(chosen), 3)))
+            light = self._direct(points, 3_000_000 + k)
+            table = around.tables[0][:, : len(around.to_grey)]
+            arriving, _, enclosed, rays = gather_indirect(
+                points, around.hemispheres, table, self.seed, 3_000_000 + k, self.workers
+            )
+            self.rays += rays
+            direct = light.irradiance.mean(axis=1)
+            chosen = chosen[enclosed & dark(arriving @ around.to_grey + direct, direct, self._mean)]
+        element = self.receivers.cells.element
+        seen = np.ones(len(element), dtype=bool)
+        seen[chosen] = False
+        return np.asarray(np.bincount(element, seen, len(self.receivers.element_corners)) == 0)
 
     def _uncertain(self) -> Bool:
         """Cells (c,) that a shadow boundary crosses, and whose direct light varies by more than their fair share of the

@@ -130,3 +130,17 @@ def test_nor_does_one_of_a_mesh_that_is_kept(gap, degrees):
     short, excess = shortfall_and_excess(result, body, sheet=False)
     assert short < BOUND
     assert excess < BOUND
+
+
+def test_a_floor_under_a_box_is_dark_up_to_the_triangles_that_show():
+    """The light of what is seen may reach as far under the box as the triangles that its outline crosses, and no
+    further; and those that show in part are not dark."""
+    body = box("body", (-0.5, -0.5, 0), (0.5, 0.5, 0.7), surface=1, receives=False)
+    scene = Scene((FLOOR, body), SURFACES, sky=(1.0, 1.0, 1.0))
+    (baked,) = bake(scene, Settings(size=0.15, error=0.1)).objects
+    corners = np.abs(baked.vertices[baked.triangles][:, :, :2])
+    inside = (corners <= 0.5).all(axis=(1, 2))
+    light = baked.layers["combined"].max(axis=(1, 2))
+    assert inside.any()
+    assert light[inside].max() == 0
+    assert light[(corners.max(axis=2) > 0.5 + 1e-9).any(axis=1)].min() > 0
