@@ -23,7 +23,7 @@ def escaped_share(
     hemispheres = Hemispheres(patches, visibility, rays, stream(seed, "escaped patterns"))
     brings = np.zeros((hemispheres.code_count, 1), dtype=np.float32)
     brings[hemispheres.codes.escaped :] = 1.0
-    points = Points(cells, np.arange(len(cells)), 0, stream(seed, "escaped").random((len(cells), 2)))
+    points = Points.of_pass(cells, np.arange(len(cells)), 0, stream(seed, "escaped").random((len(cells), 2)))
     share, _, _, cast = gather_indirect(points, hemispheres, brings, seed, 0, workers)
     corner = receivers.corner_vertex[cells.element].ravel()
     weight = np.repeat(cells.area, 3)
