@@ -30,6 +30,18 @@ _CLEAR = 0.1
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
+#: Custom property of a material that shows baked light: the material in whose place it stands, if there was one.
+STANDS_FOR_KEY = "radiosity_baker_stands_for"
+
+
+def own_material(material: bpy.types.Material | None) -> bpy.types.Material | None:
+    """The person's own material, behind the one that shows baked light if there is one."""
+    if material is None or STANDS_FOR_KEY not in material:
+        return material
+    behind = material[STANDS_FOR_KEY]
+    return behind if isinstance(behind, bpy.types.Material) else None
+
+
 @dataclass(frozen=True)
 class Placement:
     """How an image lies on a mesh: by which UV map (empty: the active one for rendering), moved by matrix (2, 3), and

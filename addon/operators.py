@@ -19,7 +19,7 @@ from ..core.plan import plan
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import attribute_writer, bake_scene, checklist, copies, panels, scene_reader, viewport, wording
+from . import attribute_writer, bake_scene, checklist, copies, light_materials, panels, scene_reader, viewport, wording
 from .job import BakeJob
 from .window_bake import WindowBake
 
@@ -229,6 +229,7 @@ class OBJECT_OT_radiosity_clear(bpy.types.Operator):
         return _can_bake(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
+        light_materials.put_back(obj for obj in context.scene.objects if obj.type == "MESH")
         copies.remove_copies(context.view_layer, list(context.view_layer.objects))
         for obj in context.scene.objects:
             if obj.type == "MESH" and obj.data.library is None:

@@ -10,7 +10,7 @@ from typing import ClassVar
 import bpy
 from bpy.app.translations import pgettext_iface as tr
 
-from . import presets, viewport
+from . import light_materials, presets, viewport
 from .checklist import FIXES
 from .copies import original_of
 from .job import BakeJob
@@ -101,6 +101,11 @@ class LastBakeSection:
             layout.operator("view3d.radiosity_restore", icon="LOOP_BACK")
         else:
             layout.operator("view3d.radiosity_show", icon="HIDE_OFF")
+        row = layout.row(align=True)
+        row.operator("object.radiosity_show_light", icon="MATERIAL")
+        row.operator("object.radiosity_show_lit")
+        if light_materials.shows_light(light_materials.last_baked(context.scene)):
+            layout.operator("object.radiosity_put_back", icon="LOOP_BACK")
         layers = viewport.baked_layers(context.scene, report)
         if len(layers) > 1:
             grid = layout.grid_flow(columns=3, even_columns=True, align=True)

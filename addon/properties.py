@@ -8,7 +8,7 @@ import bpy
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, PointerProperty, StringProperty
 
 from ..core import settings as core
-from . import viewport
+from . import light_materials, viewport
 from .checklist import Problem
 from .colour_storage import Storage
 
@@ -63,6 +63,7 @@ def _show_layer(settings: "RadiosityBakerSettings", _context: bpy.types.Context)
     report = settings.last_report()
     if report:
         viewport.show_layer(settings.id_data, report, settings.layer)
+        light_materials.follow_layer(light_materials.last_baked(settings.id_data))
 
 
 def _plan_again(settings: "RadiosityBakerSettings", _context: bpy.types.Context) -> None:

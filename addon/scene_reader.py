@@ -14,7 +14,7 @@ from .copies import copies_of, original_of, place_of
 from .corner_values import corner_colors, corner_uv
 from .lamps import read_lamp, read_portal, warn_of_linking
 from .material_samples import MaterialSamples, Sampled
-from .materials import DEFAULT_SURFACE, MaterialSurface, read_material
+from .materials import DEFAULT_SURFACE, MaterialSurface, own_material, read_material
 from .receiver_source import ReceiverSource
 from .render_visibility import rendered_objects, shown_as_rendered
 from .world import read_world
@@ -363,7 +363,7 @@ def _materials(obj: bpy.types.Object) -> list[bpy.types.Material | None]:
     for index, slot in enumerate(obj.material_slots[: len(materials)]):
         if slot.link == "OBJECT":
             materials[index] = slot.material
-    return materials or [None]
+    return [own_material(material) for material in materials] or [None]
 
 
 def _renders(instance: bpy.types.DepsgraphObjectInstance, rendered: set[bpy.types.Object]) -> bool:

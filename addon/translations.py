@@ -25,6 +25,9 @@ GERMAN = {
     "Clear Baked Light": "Gebackenes Licht löschen",
     "Show Baked Light": "Gebackenes Licht zeigen",
     "Restore Viewport": "Ansicht zurücksetzen",
+    "Show in Materials": "In Materialien zeigen",
+    "Multiply with Colors": "Mit Farben malnehmen",
+    "Restore Materials": "Materialien zurückgeben",
     "Radiosity Presets": "Radiosity-Vorgaben",
     "Add Radiosity Preset": "Radiosity-Vorgabe hinzufügen",
     "Choose Preset": "Vorgabe wählen",
@@ -191,6 +194,13 @@ GERMAN = {
     "3D-Ansicht zeigen: solide Schattierung, flaches Licht, Attributfarben",
     "Give the 3D View back the shading it had before it showed the baked light": "Der 3D-Ansicht die Schattierung "
     "zurückgeben, die sie vorher hatte",
+    "Let the baked objects give off their active layer in Material Preview and renders, without lamps": "Die Objekte "
+    "geben in Materialvorschau und Rendern ihre aktive Ebene ab, ohne Lampen",
+    "Let the baked objects give off the layer Light times the colours of their materials, textures included, in "
+    "Material Preview and renders": "Die Objekte geben in Materialvorschau und Rendern die Ebene Licht mal der Farben "
+    "ihrer Materialien ab, mit Texturen",
+    "Give the baked objects the materials back that they had before they showed the light": "Den Objekten die "
+    "Materialien zurückgeben, die sie vorher hatten",
     # What is said of a bake
     "Baked": "Gebacken",
     "Estimated Error": "Geschätzter Fehler",

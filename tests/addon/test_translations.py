@@ -8,7 +8,7 @@ import pytest
 from radiosity_baker.addon import checklist, presets, properties
 from radiosity_baker.addon.translations import GERMAN
 
-FILES = ("panels", "properties", "operators", "presets", "viewport", "checklist", "wording")
+FILES = ("panels", "properties", "operators", "presets", "viewport", "light_materials", "checklist", "wording")
 SPOKEN = {"name", "description", "text", "heading"}
 
 
