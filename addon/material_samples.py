@@ -1,16 +1,16 @@
 """Materials that only Cycles can read, sampled by Cycles itself all over the faces that have them.
 
 A copy of the mesh, cut so finely that its corners lie close together, goes into a scene of its own, and Cycles bakes
-the colour and the emission of its materials to the corners (Blender's bake types Diffuse with only Colour, and Emit):
-no light is traced. What it finds fills a texture in which each triangle has pixels of its own, as in Ptex (Burley and
-Lacewell 2008). Everything that is made for this is removed again, whatever happens; the user's scene, its materials and
-their nodes are never touched.
+the colour and the emission of its materials to the corners (Blender's bake types Diffuse with only Colour, and Emit);
+and where there are holes or veils a third time how open they are, made to glow. No light is traced. It all fills a
+texture in which each triangle has pixels of its own, as in Ptex (Burley and Lacewell 2008). Everything that is made for
+this is removed again, whatever happens; the user's scene, its materials and their nodes are never touched.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,16 +43,23 @@ _BY_OBJECT = {
 }
 #: Inputs of the Principled BSDF that put something over its diffuse part, or take from it what is not baked.
 _OVER = ("Specular IOR Level", "Coat Weight", "Sheen Weight", "Subsurface Weight")
+_TRANSPARENT = "ShaderNodeBsdfTransparent"
+#: Nodes that hand on shaders from elsewhere.
+_NO_SHADERS = {"ShaderNodeGroup", "NodeGroupInput", "NodeReroute"}
+#: Less than this share of a surface has no colour of its own.
+_FAINTEST = 1e-3
 
 Values = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Of one mesh: albedo and emission as textures, None where nothing emits; uv (t, 3, 2) of its triangles in both."""
+    """Of one mesh: albedo, emission and opacity as textures, None where nothing emits, and where all is opaque; uv
+    (t, 3, 2) of its triangles in all of them."""
 
     albedo: Texture
     emission: Texture | None
+    opacity: Texture | None
     uv: Float32
 
 
@@ -159,14 +166,23 @@ def _studio(frame: int) -> Iterator[bpy.types.Scene]:
 
 def _sample(studio: bpy.types.Scene, request: _Request, parts: float) -> Sampled:
     lattice = Lattice(_cuts(request.triangles, parts))
-    with ExitStack() as stack:
-        obj = stack.enter_context(_finely_cut(studio, request, lattice))
-        for slot, material in enumerate(request.materials):
-            obj.data.materials[slot] = material and stack.enter_context(_diffuse_part(material))
-        albedo = _bake(studio, obj, "DIFFUSE", {"COLOR"})
-        emission = _bake(studio, obj, "EMIT", set())
-    glow = lattice.texture(emission) if emission.any() else None
-    return Sampled(lattice.texture(albedo), glow, lattice.uv)
+    with _finely_cut(studio, request, lattice) as obj:
+        with _altered(obj, request.materials, _leave_diffuse_part):
+            albedo = _bake(studio, obj, "DIFFUSE", {"COLOR"})
+            emission = _bake(studio, obj, "EMIT", set())
+        opacity = None
+        if any(material and _lets_through(material.node_tree) for material in request.materials):
+            with _altered(obj, request.materials, _glow_where_open):
+                covers = np.maximum(1.0 - _bake(studio, obj, "EMIT", set()), 0.0)
+            opacity, mixed = np.repeat(covers[:, :1], 3, axis=1), covers[:, 1:2]
+            # A mix with a transparent shader dims the others; what is there has their whole colour.
+            albedo, emission = (v / np.where(mixed > _FAINTEST, mixed, 1.0) for v in (albedo, emission))
+    return Sampled(
+        lattice.texture(albedo),
+        lattice.texture(emission) if emission.any() else None,
+        None if opacity is None else lattice.texture(opacity),
+        lattice.uv,
+    )
 
 
 def _bake(studio: bpy.types.Scene, obj: bpy.types.Object, kind: str, passes: set[str]) -> Float32:
@@ -212,23 +228,78 @@ def _finely_cut(studio: bpy.types.Scene, request: _Request, lattice: Lattice) ->
 
 
 @contextmanager
-def _diffuse_part(material: bpy.types.Material) -> Iterator[bpy.types.Material]:
-    """A copy of a material without what lies over its diffuse part, which is not baked and would dim it."""
-    made: list[bpy.types.ID] = [material.copy()]
+def _altered(
+    obj: bpy.types.Object,
+    materials: Sequence[bpy.types.Material | None],
+    alter: Callable[[bpy.types.NodeTree], None],
+) -> Iterator[None]:
+    """Give the object copies of its materials by slot, whose node trees and groups are altered."""
+    made: list[bpy.types.ID] = []
     try:
-        trees = [made[0].node_tree] if made[0].node_tree else []
-        while trees:
-            for node in (tree := trees.pop()).nodes:
-                if node.bl_idname == "ShaderNodeGroup" and node.node_tree:
-                    node.node_tree = node.node_tree.copy()
-                    made.append(node.node_tree)
-                    trees.append(node.node_tree)
-                if node.bl_idname == "ShaderNodeBsdfPrincipled":
-                    for name, value in (*((name, 0.0) for name in _OVER), ("Alpha", 1.0)):
-                        _set(tree, node.inputs[name], value)
-        yield made[0]
+        for slot, material in enumerate(materials):
+            copy = material and material.copy()
+            obj.data.materials[slot] = copy
+            made += [copy] if copy else []
+            trees = [copy.node_tree] if copy and copy.node_tree else []
+            while trees:
+                tree = trees.pop()
+                for node in tree.nodes:
+                    if node.bl_idname == "ShaderNodeGroup" and node.node_tree:
+                        node.node_tree = node.node_tree.copy()
+                        made.append(node.node_tree)
+                        trees.append(node.node_tree)
+                alter(tree)
+        yield
     finally:
         bpy.data.batch_remove(made)
+
+
+def _leave_diffuse_part(tree: bpy.types.NodeTree) -> None:
+    """Take away what lies over the diffuse part, which is not baked and would dim it; and all ways through, or Cycles
+    would bake what is behind."""
+    for node in tree.nodes:
+        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+            for name, value in (*((name, 0.0) for name in _OVER), ("Alpha", 1.0)):
+                _set(tree, node.inputs[name], value)
+        if node.bl_idname == _TRANSPARENT:
+            for link in list(node.outputs[0].links):
+                tree.links.remove(link)
+
+
+def _glow_where_open(tree: bpy.types.NodeTree) -> None:
+    """Make every shader an emission: red for the share that it lets straight through, green for it where it is nothing
+    but transparent."""
+    for node in list(tree.nodes):
+        shaders = [output for output in node.outputs if output.type == "SHADER"]
+        if not shaders or any(socket.type == "SHADER" for socket in node.inputs) or node.bl_idname in _NO_SHADERS:
+            continue
+        glow, colour = tree.nodes.new("ShaderNodeEmission"), tree.nodes.new("ShaderNodeCombineColor")
+        tree.links.new(colour.outputs[0], glow.inputs["Color"])
+        if node.bl_idname == _TRANSPARENT:
+            colour.inputs["Red"].default_value = colour.inputs["Green"].default_value = 1.0
+        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+            rest, alpha = tree.nodes.new("ShaderNodeMath"), node.inputs["Alpha"]
+            rest.operation, rest.use_clamp = "SUBTRACT", True
+            rest.inputs[0].default_value, rest.inputs[1].default_value = 1.0, alpha.default_value
+            if alpha.is_linked:
+                tree.links.new(alpha.links[0].from_socket, rest.inputs[1])
+            tree.links.new(rest.outputs[0], colour.inputs["Red"])
+        for link in [link for output in shaders for link in output.links]:
+            tree.links.new(glow.outputs[0], link.to_socket)
+
+
+def _lets_through(tree: bpy.types.NodeTree | None) -> bool:
+    """Whether a node tree may be less than opaque somewhere."""
+    for node in tree.nodes if tree else ():
+        if node.bl_idname == _TRANSPARENT:
+            return True
+        if node.bl_idname == "ShaderNodeBsdfPrincipled":
+            alpha = node.inputs["Alpha"]
+            if alpha.is_linked or alpha.default_value < 1.0:
+                return True
+        if node.bl_idname == "ShaderNodeGroup" and _lets_through(node.node_tree):
+            return True
+    return False
 
 
 def _set(tree: bpy.types.NodeTree, socket: bpy.types.NodeSocket, value: float) -> None:

@@ -9,7 +9,22 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..core.scene import Bool, Float32, Float64, Int32, Lamp, Portal, Scene, SceneError, SceneObject, SkyMap, Surface
+from ..core.scene import (
+    RGB,
+    Bool,
+    Float32,
+    Float64,
+    Int32,
+    Lamp,
+    Portal,
+    Scene,
+    SceneError,
+    SceneObject,
+    SkyMap,
+    Surface,
+    Texture,
+)
+from ..core.textures import even_points, look_up
 from .copies import copies_of, original_of, place_of
 from .corner_values import corner_colors, corner_uv
 from .lamps import read_lamp, read_portal, warn_of_linking
@@ -18,6 +33,9 @@ from .materials import DEFAULT_SURFACE, MaterialSurface, own_material, read_mate
 from .receiver_source import ReceiverSource
 from .render_visibility import rendered_objects, shown_as_rendered
 from .world import read_world
+
+#: Points of a triangle that tell whether its sampled opacity varies, and by how much less it does not.
+_OPACITY_POINTS, _EVEN = 64, 1e-3
 
 
 def pick_receivers(
@@ -233,7 +251,7 @@ class _Reading:
             uv = np.zeros((*own.triangles.shape, 2), np.float32) if own.uv is None else own.uv
             uv[unread] = sampled[number].uv[unread][:, turn]
             surface = own.surface.copy()
-            surface[unread] = self.surfaces.sampled(own.surface[unread], number, sampled[number])
+            surface[unread] = self.surfaces.sampled(own.surface, unread, number, sampled[number])
             self.objects[index] = replace(own, surface=surface, uv=uv)
         self.surfaces.forget_unread()
 
@@ -290,6 +308,21 @@ class _LocalMesh:
         )
 
 
+def _rest(share: RGB) -> RGB:
+    red, green, blue = share
+    return (1.0 - red, 1.0 - green, 1.0 - blue)
+
+
+def _veil_or_holes(sampled: Sampled, chosen: Bool) -> tuple[float, Texture | None]:
+    """Opacity of the chosen triangles among those (t,) that are sampled: one number, or a texture where it varies."""
+    if sampled.opacity is None:
+        return 1.0, None
+    places = [np.einsum("c,tck->tk", point, sampled.uv[chosen]) for point in even_points(_OPACITY_POINTS)]
+    opacity = np.concatenate([look_up(sampled.opacity, place)[:, 0] for place in places])
+    even = np.ptp(opacity) < _EVEN
+    return (float(np.clip(opacity.mean(), 0.0, 1.0)), None) if even else (1.0, sampled.opacity)
+
+
 class _SurfaceTable:
     """Surfaces of the scene, one per material that some face uses; more where a material depends on its object."""
 
@@ -316,18 +349,32 @@ class _SurfaceTable:
         used = [self.all[number] for number in np.unique(surface)]
         return any(isinstance(s, MaterialSurface) and (s.placement, s.color_attribute) != (None, None) for s in used)
 
-    def sampled(self, surface: Int32, number: int, sampled: Sampled) -> Int32:
-        """The surfaces (t,) with what Cycles found, of the mesh with this number, instead of what was read."""
+    def sampled(self, surface: Int32, unread: Bool, number: int, sampled: Sampled) -> Int32:
+        """Of the faces (t,) that are unread the surfaces with what Cycles found, of the mesh with this number."""
         found = np.zeros(len(self.all), np.int32)
-        for own in np.unique(surface):
+        for own in np.unique(surface[unread]):
             key = ("sampled", number, int(own))
             if key not in self._index:
                 self._index[key] = len(self.all)
                 glow = 0.0 if sampled.emission is None else 1.0
-                name, textures = self.all[own].name, (sampled.albedo, sampled.emission)
-                self.all.append(Surface(name, (1.0, 1.0, 1.0), (glow, glow, glow), *textures))
+                read = self.all[own]
+                opacity, holes = _veil_or_holes(sampled, surface == own)
+                # Cycles does not tell what leaves on which side, so the nodes' plain values say that.
+                self.all.append(
+                    Surface(
+                        read.name,
+                        read.front_share,
+                        (glow, glow, glow),
+                        sampled.albedo,
+                        sampled.emission,
+                        transmission=_rest(read.front_share),
+                        transparent=read.transparent,
+                        opacity=opacity,
+                        opacity_texture=holes,
+                    )
+                )
             found[own] = self._index[key]
-        return found[surface]
+        return found[surface[unread]]
 
     def forget_unread(self) -> None:
         """Take back the warnings of what Cycles has read after all."""

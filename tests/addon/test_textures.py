@@ -325,6 +325,62 @@ def test_shader_groups_are_sampled(add_material, add_mesh):
     assert principled.inputs["Specular IOR Level"].default_value > 0
 
 
+@pytest.mark.parametrize("way", ["picture", "gradient", "mix", "veil"])
+def test_what_is_sampled_keeps_its_holes(add_material, add_mesh, way):
+    """Of one colour, made by a node that only Cycles can read: colour and opacity are told apart exactly."""
+    material = add_material("ShaderNodeBsdfPrincipled", Alpha=0.4 if way == "veil" else 1.0)
+    tree, principled = material.node_tree, shader_of(material)
+    hue, gradient = tree.nodes.new("ShaderNodeHueSaturation"), tree.nodes.new("ShaderNodeTexGradient")
+    hue.inputs["Color"].default_value = (0.8, 0.4, 0.2, 1.0)
+    tree.links.new(hue.outputs[0], principled.inputs["Base Color"])
+    place = tree.nodes.new("ShaderNodeTexCoord")
+    tree.links.new(place.outputs["Generated"], gradient.inputs[0])
+    if way == "picture":
+        image, bars = tree.nodes.new("ShaderNodeTexImage"), np.ones((1, 2, 4))
+        bars[:, 0, 3] = 0.0
+        image.image, image.interpolation = make_image(bars, alpha=True), "Closest"
+        tree.links.new(image.outputs["Alpha"], principled.inputs["Alpha"])
+    elif way == "gradient":
+        tree.links.new(gradient.outputs["Fac"], principled.inputs["Alpha"])
+    elif way == "mix":
+        mix, clear = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeBsdfTransparent")
+        added, glow = tree.nodes.new("ShaderNodeAddShader"), tree.nodes.new("ShaderNodeEmission")
+        tree.links.new(principled.outputs[0], added.inputs[0])
+        tree.links.new(glow.outputs[0], added.inputs[1])
+        for output, socket in zip(
+            (gradient.outputs["Fac"], clear.outputs[0], added.outputs[0]), mix.inputs, strict=True
+        ):
+            tree.links.new(output, socket)
+        tree.links.new(mix.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    obj = add_mesh()
+    obj.data.uv_layers.new(name="Map").uv.foreach_set("vector", np.array([0, 0, 1, 0, 1, 1, 0, 1], np.float32))
+    obj.data.materials.append(material)
+    bpy.context.scene.world = bpy.data.worlds.new("Sky")
+    before = counts()
+
+    scene = read(obj)
+
+    assert counts() == before
+    own = scene.objects[0]
+    surface = scene.surfaces[own.surface[0]]
+    assert (surface.opacity_texture is None) == (way == "veil")
+    true = {
+        "picture": lambda x: x > 0.5,
+        "gradient": lambda x: x,
+        "mix": lambda x: x,
+        "veil": lambda x: np.full_like(x, 0.4),
+    }[way]
+    for point in even_points(9):
+        x = np.einsum("k,tkc->tc", point, own.vertices[own.triangles])[:, 0]
+        uv = np.einsum("k,tkc->tc", point, own.uv).astype(float)
+        holes = 1.0 if surface.opacity_texture is None else look_up(surface.opacity_texture, uv)[:, 0]
+        sure = np.abs(x - 0.5) > 0.05
+        np.testing.assert_allclose((surface.opacity * holes * np.ones_like(x))[sure], true(x)[sure], atol=1e-3)
+        seen = true(x) > 0.02
+        colour = look_up(surface.albedo_texture, uv)[seen & sure]
+        np.testing.assert_allclose(colour, np.tile((0.8, 0.4, 0.2), (len(colour), 1)), atol=2e-3)
+
+
 def test_instances_share_their_samples_unless_the_material_depends_on_them(add_material, add_mesh):
     material = noisy(add_material("ShaderNodeBsdfPrincipled"))
     one = add_mesh("One")
