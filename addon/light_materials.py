@@ -135,8 +135,14 @@ def _lit(original: bpy.types.Material | None, attribute: str, factor: float) -> 
 
 
 def _tree(material: bpy.types.Material) -> bpy.types.NodeTree:
+    """The node tree of a material; one that shades without nodes gets those that do the same."""
     if shader_tree(material) is None:
         material.use_nodes = True
+        tree = material.node_tree
+        tree.nodes.clear()
+        diffuse = tree.nodes.new("ShaderNodeBsdfDiffuse")
+        diffuse.inputs["Color"].default_value = material.diffuse_color
+        tree.links.new(diffuse.outputs["BSDF"], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material.node_tree
 
 

@@ -101,6 +101,17 @@ def test_what_is_linked_to_the_colour_is_multiplied(plane, add_material, cycles_
     np.testing.assert_allclose(rendered(cycles_bake, plane), np.array(LIGHT) * COLOUR, rtol=1e-4)
 
 
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of the switch, in Blenders that have nodes always
+def test_a_material_without_nodes_has_its_viewport_colour(plane, cycles_bake, monkeypatch):
+    """As Blender 4 knew them."""
+    monkeypatch.setattr(light_materials, "shader_tree", lambda _: None)
+    material = bpy.data.materials.new("Plain")
+    material.diffuse_color = (*COLOUR, 1.0)
+    plane.data.materials.append(material)
+    light_materials.show_lit([plane])
+    np.testing.assert_allclose(rendered(cycles_bake, plane), np.array(LIGHT) * COLOUR, rtol=1e-4)
+
+
 def test_without_a_material_light_is_times_blenders_default(plane, cycles_bake):
     light_materials.show_lit([plane])
     np.testing.assert_allclose(rendered(cycles_bake, plane), 0.8 * np.array(LIGHT), rtol=1e-4)
