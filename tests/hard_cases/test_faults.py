@@ -147,9 +147,9 @@ def test_a_mesh_that_changes_during_the_bake(scene_file, monkeypatch, change):
     bpy.ops.wm.open_mainfile(filepath=str(scene_file))
     pipeline = bake_scene.bake
 
-    def bake_meanwhile(*arguments):
+    def bake_meanwhile(*arguments, **more):
         CHANGES[change]()
-        return pipeline(*arguments)
+        return pipeline(*arguments, **more)
 
     monkeypatch.setattr(bake_scene, "bake", bake_meanwhile)
     with pytest.raises(SceneError, match=r"'Square'"):
