@@ -69,7 +69,7 @@ class Bends:
         colours = cell_colours(scene, receivers)
         shown = np.mean((colours.albedo / np.pi) ** 2, axis=1)
         sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-        fits = [fit_halves(fit, halves, cells.area, shown) for halves in sampled]
+        fits = list(self._workers.map(lambda k, _: fit_halves(fit, sampled[k], cells.area, shown), len(sampled), 1))
         squared = cells.area * shown * np.sum([fitted.resolution for fitted in fits], axis=0)
         allowed = (_SHARE * self._effort.error * mean_radiance(survey, colours, fits)) ** 2 * float(cells.area.sum())
         # A split cell becomes four, and makes its neighbours become two or three.

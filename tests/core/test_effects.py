@@ -29,7 +29,7 @@ PORTAL = Portal("window", (0, 0, -5), (0.3, 0, 0), (0, 0.3, 0), (0, 0, -1))
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
 COLOR = (1.0, 1.0, 1.0)
 LAMP = PointLamp("bulb", (0.2, 0.1, 1), COLOR)
-QUICK = Settings(triangles=60, error=0.08, threads=1)
+QUICK = Settings(size=0.2, error=None, threads=1)
 
 
 @pytest.fixture
