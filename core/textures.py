@@ -55,9 +55,15 @@ def mean_colours(
     if points is None:
         points = int((_LOOK_UPS / max(len(parent), 1)) ** 0.5) ** 2
         points = min(max(points, _FEWEST_POINTS), MOST_POINTS)
-    every = even_points(points)
-    parts = [point_colours(scene, scene_object, parent, barycentric, point, 1.0 / points) for point in every]
-    return Colours(*(np.mean([getattr(part, name) for part in parts], axis=0) for name in ("albedo", "emission")))
+    # So many points at once that few triangles do not take a call for each.
+    groups = np.array_split(even_points(points), -(-points * max(len(parent), 1) // _CHUNK))
+    albedo, emission = np.zeros((2, len(parent), 3))
+    for group in (group for group in groups if len(group)):
+        own, parts = np.tile(parent, len(group)), np.tile(barycentric, (len(group), 1, 1))
+        found = point_colours(scene, scene_object, own, parts, np.repeat(group, len(parent), axis=0), 1.0 / points)
+        albedo += found.albedo.reshape(len(group), -1, 3).sum(axis=0)
+        emission += found.emission.reshape(len(group), -1, 3).sum(axis=0)
+    return Colours(albedo / points, emission / points)
 
 
 def constant_colours(scene: Scene, surface: Int32) -> Colours:
@@ -69,11 +75,12 @@ def constant_colours(scene: Scene, surface: Int32) -> Colours:
 def point_colours(
     scene: Scene, scene_object: SceneObject, parent: Int32, barycentric: Float64, point: Float64, share: float
 ) -> Colours:
-    """Colours at one point (3,), by its barycentric weights, of each of m parts of triangles, as in `mean_colours`.
+    """Colours at a point (3,), or a point each (m, 3), by barycentric weights, of m parts of triangles, as in
+    `mean_colours`.
 
     share: of the part's area that the point stands for; 0 takes single pixels.
     """
-    weights = np.einsum("c,mck->mk", point, barycentric)
+    weights = np.einsum("mc,mck->mk", np.broadcast_to(point, (len(parent), 3)), barycentric)
     surface = scene_object.surface[parent]
     colours = constant_colours(scene, surface)
     if scene_object.colors is not None:

@@ -82,13 +82,13 @@ def emitting_pieces(scene: Scene) -> list[Piece]:
 def _piece(scene: Scene, scene_object: SceneObject, triangle: int, weights: Float64) -> Piece:
     corners = weights @ scene_object.vertices[scene_object.triangles[triangle]]
     surface = scene.surfaces[scene_object.surface[triangle]]
-    parent = np.array([triangle], dtype=np.int32)
     if surface.emission_texture is None:
         radiance = np.array([surface.emitted])
     else:
-        every = even_points(MOST_POINTS)
-        parts = [point_colours(scene, scene_object, parent, weights[None], p, 1.0 / MOST_POINTS) for p in every]
-        radiance = np.concatenate([part.emission for part in parts])
+        parent = np.full(MOST_POINTS, triangle, dtype=np.int32)
+        part = np.broadcast_to(weights, (MOST_POINTS, 3, 3))
+        points = even_points(MOST_POINTS)
+        radiance = point_colours(scene, scene_object, parent, part, points, 1.0 / MOST_POINTS).emission
     return Piece(
         surface.name,
         scene_object,
