@@ -61,11 +61,9 @@ def run(arguments: Sequence[str]) -> int:
         options = _parser().parse_args(arguments)
     except SystemExit as stop:  # argparse has said what it has to say; Blender must not quit half-way for it
         return int(stop.code or SUCCESS)
-    if not hasattr(bpy.types.Object, "radiosity_baker"):
-        properties.register()  # What the file says of its objects is unreadable without.
     progress = Progress() if options.quiet else PrintedProgress()
     try:
-        with _interruptible(progress):
+        with _interruptible(progress), properties.known():
             options.command(options, progress)
     except (FileError, SceneError) as problem:
         print(f"radiosity-baker: {problem}", file=sys.stderr)

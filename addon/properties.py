@@ -1,6 +1,8 @@
 """What a person may set in the panel, kept in the scene, and how it becomes `core.settings.Settings`."""
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
@@ -354,3 +356,16 @@ def unregister() -> None:
     del bpy.types.Scene.radiosity_baker
     bpy.utils.unregister_class(RadiosityBakerObjectSettings)
     bpy.utils.unregister_class(RadiosityBakerSettings)
+
+
+@contextmanager
+def known() -> Iterator[None]:
+    """Within, settings of scenes and objects can be read, whether or not the add-on is enabled."""
+    if hasattr(bpy.types.Object, "radiosity_baker"):
+        yield
+        return
+    register()
+    try:
+        yield
+    finally:
+        unregister()
