@@ -27,7 +27,7 @@ def main(archive: str) -> None:
     bpy.context.view_layer.objects.active = floor
     bpy.context.object.select_set(True)
     settings = bpy.context.scene.radiosity_baker
-    settings.result, settings.density, settings.triangles = "REPLACE", "TRIANGLES", 500
+    settings.result, settings.density, settings.size = "REPLACE", "SIZE", 0.3
     bpy.ops.object.radiosity_bake()
     colours = np.array([corner.color for corner in floor.data.color_attributes["Radiosity"].data])
 

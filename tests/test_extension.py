@@ -85,7 +85,8 @@ def test_the_installed_package_bakes(root: Path, packages: dict[str, Path], bare
     user = Path(bare_environment["BLENDER_USER_RESOURCES"]).resolve()
     assert Path(seen["embreex"]).resolve().is_relative_to(user)
     assert seen["package"] == "bl_ext.user_default.radiosity_baker"
-    # 0.8 * 100 / (4 pi^2) * 2 / r^3 with r = 2 below the lamp and sqrt(12) at a corner, within what 500 triangles show.
+    # 0.8 * 100 / (4 pi^2) * 2 / r^3 with r = 2 below the lamp and sqrt(12) at a corner, within what triangles of 0.3 m
+    # show.
     light = 0.8 * 100 / (4 * math.pi**2) * 2
     assert seen["brightest"] == pytest.approx(light / 2**3, rel=0.05)
     assert seen["darkest"] == pytest.approx(light / 12**1.5, rel=0.05)

@@ -10,6 +10,7 @@ import pytest
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.convexity import nothing_stands_between
 from radiosity_baker.core.effects import EFFECTS, choose_effects
+from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.scene import (
     AreaLamp,
     PointLamp,
@@ -64,7 +65,9 @@ def sky_with_a_spot() -> SkyMap:
 
 
 def light(scene, **asked):
-    return bake(scene, replace(QUICK, **asked)).objects[0].layers["combined"].astype(float)
+    settings = replace(QUICK, **asked)
+    effort = replace(choose_effort(scene, settings), patches=100)
+    return bake(scene, settings, effort=effort).objects[0].layers["combined"].astype(float)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
