@@ -11,12 +11,13 @@
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-3.13 test-4.5 lint samples extension repository accuracy bench effects test-gui clean
+.PHONY: bake test test-own test-other test-3.13 test-4.5 lint samples extension repository accuracy bench effects test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
 # Blender 5.0 as a Python module needs Python 3.11, Blender 5.2 needs 3.13. Every recipe works with either.
 PYTHON = $(shell packaging/find-python 3.11 3.13)
+PYTEST = -m pytest --quiet
 PYTHON_3.11 = $(shell packaging/find-python 3.11)
 PYTHON_3.13 = $(shell packaging/find-python 3.13)
 
@@ -25,8 +26,14 @@ bake: .venv/ready
 	@.venv/bin/radiosity-baker bake $(SAMPLE) --output build/cornell_box.blend --preview build/cornell_box.png --report build/report.json
 	@echo "Look at build/cornell_box.png, open build/cornell_box.blend in Blender; the figures are in build/report.json."
 
+# Both Pythons at once: a test seldom keeps more than one core busy.
 test: lint
-	.venv/bin/python -m pytest --quiet
+	@$(MAKE) --jobs=2 $(if $(filter output-sync,$(.FEATURES)),--output-sync) test-own test-other
+
+test-own: .venv/ready
+	.venv/bin/python $(PYTEST)
+
+test-other: .venv/ready
 	@if .venv/bin/python -c 'import sys; sys.exit(sys.version_info < (3, 13))'; then \
 	    echo "SKIPPED: the tests on Python 3.11, which Blender 4.3 to 5.0 use: none that runs was found."; \
 	elif test -n "$(PYTHON_3.13)"; then $(MAKE) test-3.13; \
@@ -35,10 +42,10 @@ test: lint
 	fi
 
 test-3.13: .venv-3.13/ready
-	.venv-3.13/bin/python -m pytest --quiet
+	.venv-3.13/bin/python $(PYTEST)
 
 test-4.5: .venv-4.5/ready
-	.venv-4.5/bin/python -m pytest --quiet
+	.venv-4.5/bin/python $(PYTEST)
 
 lint: .venv/ready
 	.venv/bin/ruff check --quiet
