@@ -8,23 +8,20 @@ these ticks, so a cancelled bake has touched nothing, and one undo step takes a 
 import json
 import traceback
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
 
 from ..core.lint import findings
-from ..core.plan import plan
+from ..core.plan import plan, price_of_accuracy
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
 from . import attribute_writer, bake_scene, checklist, copies, light_materials, panels, scene_reader, viewport, wording
 from .job import BakeJob
 from .window_bake import WindowBake
-
-#: Errors whose cost is told beforehand.
-ERRORS = (0.05, 0.02, 0.01, 0.005)
 
 
 class OBJECT_OT_radiosity_bake(bpy.types.Operator):
@@ -159,7 +156,7 @@ def _plan(context: bpy.types.Context) -> None:
             "seconds": planned.seconds,
             "memory_mb": planned.memory_mb,
             "effects": [asdict(effect) for effect in planned.effects],
-            "costs": [[error, plan(scene, replace(settings, error=error, seconds=None)).seconds] for error in ERRORS],
+            "costs": [[error, priced.seconds] for error, priced in price_of_accuracy(scene, settings).items()],
         }
     asked.plan = json.dumps(told | {"problems": [asdict(problem) for problem in problems]})
 

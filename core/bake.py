@@ -9,7 +9,6 @@ from .baked import Baked
 from .bending import Bends
 from .check import check_cost, check_scene
 from .clock import Clock
-from .cost import refuse_without_room
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
 from .direct.lamps import place
@@ -52,7 +51,6 @@ def bake(
     with clock.stage("plan", 0.0):
         planned = plan(check_scene(scene), settings, effort)
         check_cost(planned)
-        refuse_without_room(planned.memory_mb)
     scene = planned.scene
     effort = planned.effort
     clock.progress.expected = planned.seconds

@@ -7,17 +7,16 @@ left is within the asked error. Where light is flat the coarse triangles stay.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
 
-from .accuracy import fit_halves
 from .direct.illumination import DirectLight
 from .parallel import Workers
 from .plan import Effort
-from .receivers import Receivers, cell_colours, split_cells
-from .reconstruction import Fit
-from .refinement import mean_radiance
+from .receivers import Receivers, split_cells
+from .refinement import fit_samples
 from .sampling import stream, subseed
 from .scene import Bool, Scene
 from .survey import Surroundings, Survey
@@ -36,7 +35,7 @@ class Bends:
     def __init__(
         self, direct_light: DirectLight, around: Surroundings | None, effort: Effort, seed: int, workers: Workers
     ) -> None:
-        self.rays: dict[str, int] = {}
+        self.rays: Counter[str] = Counter()
         self._light = direct_light
         self._around = around and replace(
             around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "bend patterns"))
@@ -53,8 +52,7 @@ class Bends:
             survey = Survey(receivers, self._light, self._around, self._effort, seed, self._workers)
             for _ in range(_PASSES):
                 survey.run_pass()
-            for purpose, count in survey.rays.items():
-                self.rays[purpose] = self.rays.get(purpose, 0) + count
+            self.rays += survey.rays
             chosen = self._worst(scene, survey, limit)
             if not chosen.any():
                 break
@@ -63,15 +61,10 @@ class Bends:
 
     def _worst(self, scene: Scene, survey: Survey, limit: int) -> Bool:
         """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
-        receivers = survey.receivers
-        cells = receivers.cells
-        fit = Fit(receivers, survey.valid_samples, survey.invalid)
-        colours = cell_colours(scene, receivers)
-        shown = np.mean((colours.albedo / np.pi) ** 2, axis=1)
-        sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-        fits = list(self._workers.map(lambda k, _: fit_halves(fit, sampled[k], cells.area, shown), len(sampled), 1))
-        squared = cells.area * shown * np.sum([fitted.resolution for fitted in fits], axis=0)
-        allowed = (_SHARE * self._effort.error * mean_radiance(survey, colours, fits)) ** 2 * float(cells.area.sum())
+        cells = survey.receivers.cells
+        found = fit_samples(survey, scene, self._workers)
+        squared = cells.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
+        allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         # A split cell becomes four, and makes its neighbours become two or three.
         room = max((limit - len(cells)) // 5, 0)
         large = cells.area > _SMALLEST * cells.area.sum() / limit

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .cost import refuse_without_room
 from .plan import Plan
 from .scene import ALBEDO_LIMIT, AreaLamp, Scene, SceneError, SceneObject, SkyMap, Surface
 
@@ -17,12 +18,13 @@ _MOST_CELLS = 20_000_000
 
 
 def check_cost(plan: Plan) -> None:
-    """Raise SceneError, with numbers, before memory runs out."""
+    """Raise SceneError, with numbers, before a bake that is too large, or larger than the memory that is free."""
     if plan.cells > _MOST_CELLS:
         raise SceneError(
             f"This bake would split the objects into {plan.cells:,} triangles and hold {plan.memory_mb / 1e3:,.0f} GB: "
             f"choose a larger triangle size, or fewer triangles; {_MOST_CELLS:,} are the most."
         )
+    refuse_without_room(plan.memory_mb)
 
 
 def check_scene(scene: Scene) -> Scene:

@@ -21,7 +21,7 @@ from .result import Effect
 from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp, Surface
 from .settings import Settings
 from .sky import equal_texels
-from .textures import triangle_colours, varying_albedo, varying_emission
+from .textures import triangle_colours, triangle_emission, varying_albedo, varying_emission
 
 #: Emitting triangles up to this many are sampled one by one, as lamps are. Of more, some are chosen at each point, or,
 #: where they are more than this part of all surfaces, the rays that look around find them.
@@ -198,7 +198,7 @@ def textured_emission(scene: Scene, _: Settings) -> Effect:
 
 def emitting_triangles(scene: Scene) -> int:
     """How many triangles emit light."""
-    return sum(int(np.count_nonzero(triangle_colours(scene, o).emission.max(axis=1) > 0)) for o in scene.objects)
+    return sum(int(np.count_nonzero(triangle_emission(scene, o).max(axis=1) > 0)) for o in scene.objects)
 
 
 def emitters_by_rays(scene: Scene) -> bool:
@@ -210,7 +210,7 @@ def emitters_by_rays(scene: Scene) -> bool:
     for scene_object in scene.objects:
         area = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
         total += float(area.sum())
-        emitting += float(area[triangle_colours(scene, scene_object).emission.max(axis=1) > 0].sum())
+        emitting += float(area[triangle_emission(scene, scene_object).max(axis=1) > 0].sum())
     return emitting > LARGE_PART * total
 
 

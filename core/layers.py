@@ -94,12 +94,7 @@ class Layers:
 
 def _standard_error(receivers: Receivers, light: Light) -> Float64:
     """(e, 3): root of the mean square error of the cells around each vertex, W/(m^2 sr)."""
-    cells = receivers.cells
-    corner = receivers.corner_vertex[cells.element].ravel()
-    weight = np.repeat(cells.area, 3)
-    total = np.bincount(corner, weight * np.repeat(light.cell_error, 3), receivers.vertices)
-    share = np.bincount(corner, weight, receivers.vertices)
-    return np.asarray(np.sqrt(total / np.maximum(share, np.finfo(float).tiny)))[receivers.corner_vertex]
+    return np.asarray(np.sqrt(receivers.vertex_means(light.cell_error)))[receivers.corner_vertex]
 
 
 def _unreached(light: Light) -> Float64:

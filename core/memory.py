@@ -20,7 +20,7 @@ from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .parallel import Workers
 from .receivers import cell_colours
-from .refinement import Light, fit_alone, refine
+from .refinement import Light, fit_alone, mean_reflected, refine
 from .result import BakeResult
 from .scene import AreaLamp, Float64, Lamp, PointLamp, Scene, SpotLamp, SunLamp
 from .settings import Settings
@@ -198,6 +198,4 @@ def _brightness(baked: Baked, light: Light) -> float:
     """Mean reflected radiance on the receivers, W/(m^2 sr)."""
     receivers = baked.survey.receivers
     arriving = (light.lamps + light.reflected + light.emitted + light.sky).mean(axis=1)
-    on_cells = arriving[receivers.corner_vertex[receivers.cells.element]].mean(axis=1)
-    albedo = cell_colours(baked.plan.scene, receivers).albedo.mean(axis=1)
-    return float(receivers.cells.area @ (albedo * on_cells) / receivers.cells.area.sum() / np.pi)
+    return mean_reflected(receivers, cell_colours(baked.plan.scene, receivers), arriving)

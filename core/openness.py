@@ -25,8 +25,4 @@ def escaped_share(
     brings[hemispheres.codes.escaped :] = 1.0
     points = Points.of_pass(cells, np.arange(len(cells)), 0, stream(seed, "escaped").random((len(cells), 2)))
     share, _, _, cast = gather_indirect(points, hemispheres, brings, seed, 0, workers)
-    corner = receivers.corner_vertex[cells.element].ravel()
-    weight = np.repeat(cells.area, 3)
-    total = np.bincount(corner, weight * np.repeat(share[:, 0], 3), receivers.vertices)
-    around = np.bincount(corner, weight, receivers.vertices)
-    return np.asarray(total / np.maximum(around, np.finfo(float).tiny)), cast.total()
+    return receivers.vertex_means(share[:, 0]), cast.total()

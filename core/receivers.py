@@ -55,6 +55,14 @@ class Receivers:
         # Only when someone asks: while triangles are still being split, nobody does.
         return fit_vertices(_numbered(self.meshes), self.element_shading, self.element_surface, self.places)
 
+    def vertex_means(self, values: Float64) -> Float64:
+        """Means (v,) of the values (c,) of the cells around each fit vertex, by area."""
+        corner = self.corner_vertex[self.cells.element].ravel()
+        weight = np.repeat(self.cells.area, 3)
+        total = np.bincount(corner, weight * np.repeat(values, 3), self.vertices)
+        around = np.bincount(corner, weight, self.vertices)
+        return np.asarray(total / np.maximum(around, np.finfo(float).tiny))
+
     @cached_property
     def cell_vertex(self) -> Int32:
         """(c, 3) the mesh vertex of each corner of the cells, counted over all receivers."""

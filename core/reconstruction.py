@@ -66,6 +66,12 @@ class Samples:
         total.low, total.high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
         return total
 
+    @property
+    def lumped(self) -> Float64:
+        """(c, 3) sums of the moments over the second corner: how much the samples weigh at each."""
+        m = self.moments
+        return np.asarray(m[:, :3] + m[:, [3, 3, 4]] + m[:, [4, 5, 5]])
+
     def grey(self) -> Samples:
         """The same samples of the mean light alone."""
         alone = Samples(0, np.ones(1))
@@ -134,7 +140,7 @@ class Fit:
             diagonal=self._scatter(moments[:, :3]),
             edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)).astype(np.float64),
             target=np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1),
-            lumped=self._scatter(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]]),
+            lumped=self._scatter(samples.lumped * weight[:, None]),
         )
 
     def solve(self, system: System, alpha: float, start: Float64 | None = None) -> Float64:

@@ -13,7 +13,7 @@ from .accuracy import UNKNOWN, ErrorEstimate, Fitted, estimate_error, fit_halves
 from .clock import Clock
 from .parallel import Workers
 from .plan import Effort
-from .receivers import cell_colours
+from .receivers import Receivers, cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
 from .settings import Settings
@@ -119,18 +119,35 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
 
 def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
-    receivers, around = survey.receivers, survey.surroundings
-    cells = receivers.cells
+    found = fit_samples(survey, scene, workers)
+    coarser = survey.coarser[0] * survey.coarser[1]
+    error, cell_error = estimate_error(found.fits, coarser, survey.receivers.cells.area, found.shown, found.radiance)
+    values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
+    return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=survey.buried())
+
+
+@dataclass(frozen=True, eq=False)
+class FittedSurvey:
+    """The fits of direct and, if any, indirect light on one structure. shown (c,): mean square over the channels of
+    albedo / pi, what a squared error of the irradiance counts; radiance: the mean, W/(m^2 sr)."""
+
+    fit: Fit
+    fits: list[Fitted]
+    shown: Float64
+    radiance: float
+
+
+def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
+    """Fit all samples so far, as smoothly as each kind of light wants it."""
+    receivers = survey.receivers
     fit = Fit(receivers, survey.valid_samples, survey.invalid)
-    sampled = [survey.direct, survey.indirect] if around else [survey.direct]
+    sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
-    shown = np.mean((colours.albedo / np.pi) ** 2, axis=1)
-    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], cells.area, shown), len(sampled), 1))
-    error, cell_error = estimate_error(
-        fits, survey.coarser[0] * survey.coarser[1], cells.area, shown, mean_radiance(survey, colours, fits)
-    )
-    values, alphas = [f.values for f in fits], tuple(f.alpha for f in fits)
-    return replace(_light(survey, values, alphas, error, cell_error, fit), buried=survey.buried())
+    area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
+    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], area, shown), len(sampled), 1))
+    reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
+    emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
+    return FittedSurvey(fit, fits, shown, emitted + reflected)
 
 
 def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
@@ -153,8 +170,7 @@ def average_light(survey: Survey) -> Light:
 
     def mean(halves: list[Samples]) -> Float64:
         total = halves[0] + halves[1]
-        m = total.moments
-        share = (m[:, :3] + m[:, [3, 3, 4]] + m[:, [4, 5, 5]]) * cells.area[:, None]
+        share = total.lumped * cells.area[:, None]
         weight = np.maximum(np.bincount(corner, share.ravel(), count), np.finfo(float).tiny)
         light = total.light * cells.area[:, None, None]
         channels = [np.bincount(corner, light[..., k].ravel(), count) / weight for k in range(light.shape[2])]
@@ -195,11 +211,9 @@ def _light(
     )
 
 
-def mean_radiance(survey: Survey, colours: Colours, fits: list[Fitted]) -> float:
-    """Mean over the receivers and the channels of the radiance, W/(m^2 sr)."""
-    receivers = survey.receivers
+def mean_reflected(receivers: Receivers, colours: Colours, irradiance: Float64) -> float:
+    """Mean radiance, W/(m^2 sr), over the receivers and the channels, that cells of these colours reflect of the mean
+    irradiance (v,) at the vertices."""
     cells = receivers.cells
-    corner = receivers.corner_vertex[cells.element]
-    grey = np.sum([fitted.grey for fitted in fits], axis=0)[corner].mean(axis=1)
-    albedo, emission = colours.albedo.mean(axis=1), colours.emission.mean(axis=1)
-    return float(cells.area @ (emission + albedo * grey / np.pi) / cells.area.sum())
+    on_cells = irradiance[receivers.corner_vertex[cells.element]].mean(axis=1)
+    return float(cells.area @ (colours.albedo.mean(axis=1) * on_cells) / cells.area.sum() / np.pi)

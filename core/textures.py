@@ -178,6 +178,13 @@ def triangle_colours(scene: Scene, scene_object: SceneObject) -> Colours:
     return mean_colours(scene, scene_object, every, np.broadcast_to(np.eye(3), (len(every), 3, 3)))
 
 
+def triangle_emission(scene: Scene, scene_object: SceneObject) -> Float64:
+    """Mean emission (t, 3) of each triangle of an object, W/(m^2 sr). Looks nothing up where none shines unevenly."""
+    if varying_emission(scene, scene_object):
+        return triangle_colours(scene, scene_object).emission
+    return constant_colours(scene, scene_object.surface).emission
+
+
 def _some(scene: Scene, scene_object: SceneObject, holds: Callable[[Surface], bool]) -> bool:
     """Whether some surface of an object is such."""
     return any(holds(scene.surfaces[number]) for number in np.unique(scene_object.surface))

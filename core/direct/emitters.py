@@ -14,7 +14,7 @@ from ..effects import MOST_PANELS, emitters_by_rays, emitting_triangles
 from ..patches import Space, triangle_geometry
 from ..scene import Float64, Scene, SceneObject
 from ..tessellation import quarters
-from ..textures import MOST_POINTS, even_points, point_colours, triangle_colours
+from ..textures import MOST_POINTS, even_points, point_colours, triangle_emission
 from .emitter_tree import EmitterTree
 from .illumination import Source
 from .lamps import Panel
@@ -51,7 +51,7 @@ def emitting_panels(scene: Scene, space: Space) -> list[Source]:
 def _tree(scene: Scene, space: Space) -> EmitterTree:
     corners, radiance = [], []
     for scene_object in scene.objects:
-        emission = triangle_colours(scene, scene_object).emission
+        emission = triangle_emission(scene, scene_object)
         own = space.normalise(scene_object.vertices[scene_object.triangles])
         emits = (emission.max(axis=1) > 0) & (triangle_geometry(own)[1] > 0)
         corners.append(own[emits])
@@ -65,7 +65,7 @@ def emitting_pieces(scene: Scene) -> list[Piece]:
         return []
     pieces = []
     for scene_object in scene.objects:
-        emits = triangle_colours(scene, scene_object).emission.max(axis=1) > 0
+        emits = triangle_emission(scene, scene_object).max(axis=1) > 0
         pieces += [_piece(scene, scene_object, int(triangle), np.eye(3)) for triangle in np.flatnonzero(emits)]
     pieces = [piece for piece in pieces if piece.area > 0]
     while len(pieces) < _MOST_PIECES:

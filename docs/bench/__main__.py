@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core.comparison import reference_noise
 from ...core.parallel import thread_count
 from ...core.plan import choose_effort
 from ...core.settings import Settings
@@ -231,8 +232,8 @@ def _write(results: dict[str, Any], document: Path) -> None:
         "growth": [asdict(run) for run in results["growth"]],
         "original": [asdict(run) for run in results["original"]],
         "scenes": {
-            name: {"reference_noise": reference.noise, "ours": [asdict(r) for r in ours],
-                   "cycles": [asdict(r) for r in rivals]}
+            name: {"reference_noise": reference_noise(reference.radiance[reference.visible]),
+                   "ours": [asdict(r) for r in ours], "cycles": [asdict(r) for r in rivals]}
             for name, (reference, ours, rivals) in results["scenes"].items()
         },
     }  # fmt: skip

@@ -13,34 +13,20 @@ from typing import Any
 import bpy
 import numpy as np
 
-from ...addon.accuracy import with_corners
+from ...addon.accuracy import Reference, with_corners
 from ...addon.bake_scene import bake_objects
 from ...addon.oracle import corner_bake, true_radiance
 from ...addon.scene_reader import ReceiverSource, read_scene
-from ...core.comparison import SurfacePoints, figures, radiance_at, reference_noise, scatter, visible
+from ...core.comparison import figures, radiance_at, scatter, visible
 from ...core.plan import Effort, plan
 from ...core.result import BakedObject
-from ...core.scene import Bool, Float64, Scene
+from ...core.scene import Float64
 from ...core.settings import Settings
 from ...core.visibility import Visibility
 from .scenes import build
 
 #: Of the points and of Cycles' paths; the bakes have others.
 _SEED = 7
-
-
-@dataclass(frozen=True, eq=False)
-class Reference:
-    """Points (p,) on the receivers, three estimates (p, 3, 3) of the true radiance there, which (p,) are visible."""
-
-    scene: Scene
-    points: SurfacePoints
-    radiance: Float64
-    visible: Bool
-
-    @property
-    def noise(self) -> float:
-        return reference_noise(self.radiance[self.visible])
 
 
 @dataclass(frozen=True)

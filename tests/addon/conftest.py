@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 import pytest
 
+import radiosity_baker
 from radiosity_baker.core.result import BakedObject, BakeResult, Report
 from radiosity_baker.core.scene import Scene
 
@@ -13,6 +14,14 @@ PROBE_ALBEDO = 0.5
 @pytest.fixture(autouse=True)
 def empty_scene():
     bpy.ops.wm.read_factory_settings(use_empty=True)
+
+
+@pytest.fixture
+def registered():
+    """The add-on, enabled."""
+    radiosity_baker.register()
+    yield
+    radiosity_baker.unregister()
 
 
 @pytest.fixture

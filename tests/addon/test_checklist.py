@@ -3,18 +3,12 @@
 import bpy
 import pytest
 
-import radiosity_baker
 from radiosity_baker.addon import checklist
+
+pytestmark = pytest.mark.usefixtures("registered")
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
 CUBE_FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-
-
-@pytest.fixture(autouse=True)
-def registered():
-    radiosity_baker.register()
-    yield
-    radiosity_baker.unregister()
 
 
 @pytest.fixture

@@ -4,20 +4,14 @@ import bpy
 import numpy as np
 import pytest
 
-import radiosity_baker
 from radiosity_baker.addon import light_materials
 from radiosity_baker.addon.attribute_writer import OURS_KEY
 from radiosity_baker.addon.colour_storage import EXPOSURE_KEY
 from radiosity_baker.addon.scene_reader import read_scene
 
+pytestmark = pytest.mark.usefixtures("registered")
+
 LIGHT, DIRECT, COLOUR = (0.5, 2.0, 4.0), (0.25, 0.5, 0.125), (0.8, 0.4, 0.2)
-
-
-@pytest.fixture(autouse=True)
-def registered():
-    radiosity_baker.register()
-    yield
-    radiosity_baker.unregister()
 
 
 @pytest.fixture

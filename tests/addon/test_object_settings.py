@@ -4,18 +4,12 @@ import bpy
 import numpy as np
 import pytest
 
-import radiosity_baker
 from radiosity_baker.addon.bake_scene import bake_objects
 from radiosity_baker.addon.scene_reader import pick_receivers, read_scene
 from radiosity_baker.core.scene import SceneError
 from radiosity_baker.core.settings import Settings
 
-
-@pytest.fixture(autouse=True)
-def registered():
-    radiosity_baker.register()
-    yield
-    radiosity_baker.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.fixture

@@ -12,12 +12,7 @@ from radiosity_baker.core.progress import Cancelled
 from radiosity_baker.core.scene import Scene, SceneError
 from radiosity_baker.core.settings import Settings
 
-
-@pytest.fixture(autouse=True)
-def registered():
-    radiosity_baker.register()
-    yield
-    radiosity_baker.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.fixture

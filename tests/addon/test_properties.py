@@ -5,16 +5,13 @@ from dataclasses import fields, replace
 import bpy
 import pytest
 
-import radiosity_baker
 from radiosity_baker.addon import properties
 from radiosity_baker.core.settings import LAYERS, Estimator, Settings
 
 
 @pytest.fixture(autouse=True)
-def asked():
-    radiosity_baker.register()
-    yield bpy.context.scene.radiosity_baker
-    radiosity_baker.unregister()
+def asked(registered):  # noqa: ARG001 - without it there is nothing to ask
+    return bpy.context.scene.radiosity_baker
 
 
 def test_untouched_settings_are_the_defaults_of_the_core(asked):

@@ -3,15 +3,9 @@
 import bpy
 import pytest
 
-import radiosity_baker
 from radiosity_baker.addon import viewport
 
-
-@pytest.fixture(autouse=True)
-def registered():
-    radiosity_baker.register()
-    yield
-    radiosity_baker.unregister()
+pytestmark = pytest.mark.usefixtures("registered")
 
 
 @pytest.fixture
