@@ -23,7 +23,7 @@ from ...core.result import BakedObject
 from ...core.scene import Float64
 from ...core.settings import Settings
 from ...core.visibility import Visibility
-from .scenes import build
+from .scenes import build, subdivide
 
 #: Of the points and of Cycles' paths; the bakes have others.
 _SEED = 7
@@ -87,14 +87,21 @@ def bake_once(
     name: str, label: str, settings: Settings, reference: Reference | None, effort: Effort | None = None
 ) -> Baked:
     """Build the scene anew and bake it, from Blender's meshes to Blender's attributes. Without a reference no error is
-    known."""
+    known. Where settings keep the meshes, these are as fine as settings.triangles."""
     objects = build(name)
-    scene, sources = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=True)
+    if not settings.tessellate:
+        subdivide(objects, settings.triangles)
+    scene, sources = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=settings.tessellate)
     planned = plan(scene, settings, effort)
     with _embree() as inside:
         begun, busy = perf_counter(), process_time()
         result, copies = bake_objects(
-            bpy.context, objects, settings, result_mode="new", attribute="Radiosity", effort=effort
+            bpy.context,
+            objects,
+            settings,
+            result_mode="new" if settings.tessellate else "keep",
+            attribute="Radiosity",
+            effort=effort,
         )
         seconds, busy = perf_counter() - begun, process_time() - busy
     report = result.report

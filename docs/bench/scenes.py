@@ -12,6 +12,9 @@ from math import radians
 import bpy
 import numpy as np
 from mathutils import Vector
+from numpy.typing import NDArray
+
+from ...core.tessellation import Tessellation, edge_for_count, triform, whole
 
 Point = Sequence[float]
 Colour = tuple[float, float, float]
@@ -199,3 +202,38 @@ def _nodes(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
     if owner.node_tree is None:
         owner.use_nodes = True
     return owner.node_tree
+
+
+def subdivide(objects: Objects, triangles: int) -> None:
+    """Split the objects' own meshes into about `triangles` triangles of one size: what an artist brings who models
+    finely, and wants to keep."""
+    cut = [_triangles(obj.data) for obj in objects]
+    vertices, corners = [whole.vertices for whole, _ in cut], [whole.triangles for whole, _ in cut]
+    edge = edge_for_count(vertices, corners, triangles)
+    for obj, (coarse, material) in zip(objects, cut, strict=True):
+        fine = triform(coarse, edge)
+        mesh = bpy.data.meshes.new(obj.data.name)
+        mesh.vertices.add(len(fine.vertices))
+        mesh.vertices.foreach_set("co", fine.vertices.astype(np.float32).ravel())
+        mesh.loops.add(fine.triangles.size)
+        mesh.loops.foreach_set("vertex_index", fine.triangles.ravel())
+        mesh.polygons.add(len(fine.triangles))
+        mesh.polygons.foreach_set("loop_start", np.arange(0, fine.triangles.size, 3, dtype=np.int32))
+        mesh.polygons.foreach_set("material_index", material[fine.parent])
+        for own in obj.data.materials:
+            mesh.materials.append(own)
+        mesh.update(calc_edges=True)
+        if not obj.data.polygons[0].use_smooth:
+            mesh.shade_flat()
+        obj.data = mesh
+
+
+def _triangles(mesh: bpy.types.Mesh) -> tuple[Tessellation, NDArray[np.int32]]:
+    """The triangles of a mesh, and the material index of each."""
+    vertices = np.empty(len(mesh.vertices) * 3)
+    mesh.vertices.foreach_get("co", vertices)
+    count = len(mesh.loop_triangles)
+    corners, material = np.empty(count * 3, dtype=np.int32), np.empty(count, dtype=np.int32)
+    mesh.loop_triangles.foreach_get("vertices", corners)
+    mesh.loop_triangles.foreach_get("material_index", material)
+    return whole(vertices.reshape(-1, 3), corners.reshape(-1, 3)), material
