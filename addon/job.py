@@ -83,6 +83,11 @@ class BakeJob:
         """The picture of the last complete pass, or None."""
         return self.progress.picture if isinstance(self.progress, _Watched) else None
 
+    def wait_for_picture(self, seconds: float) -> None:
+        """Until there is a picture, and no longer than that."""
+        if isinstance(self.progress, _Watched):
+            self.progress.drawn.wait(seconds)
+
     def result(self) -> BakeResult:
         """Free the desk for the next bake, and return the result or raise what the bake raised.
 
@@ -140,9 +145,11 @@ class _Watched(Progress):
         super().__init__(watched=True)
         self.latest: BakeResult | None = None
         self.picture: Any = None
+        self.drawn = threading.Event()
         self._draw = draw
 
     def show(self, so_far: Callable[[], BakeResult]) -> None:
         self.check()
         self.latest = so_far()
         self.picture = self._draw(self.latest)
+        self.drawn.set()

@@ -87,8 +87,9 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def _advance(self, context: bpy.types.Context, bake: WindowBake) -> set[str]:
-        panels.redraw(context)
         result = bake.advance(context)
+        if bake.has_news():
+            panels.redraw(context)
         if result is None:
             return {"RUNNING_MODAL"}
         self._conclude(context, result)

@@ -188,13 +188,19 @@ class AdvancedSection:
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Draw the panel and the status bar anew, and nothing that costs more."""
+    """Draw the panel and the status bar anew, where they are on show, and nothing that costs more."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
-                if (area.type, region.type) in {("VIEW_3D", "UI"), ("PROPERTIES", "WINDOW")}:
+                if _shows_panel(area, region):
                     region.tag_redraw()
         window.workspace.status_text_set(_draw_status if BakeJob.running is not None else None)
+
+
+def _shows_panel(area: bpy.types.Area, region: bpy.types.Region) -> bool:
+    if (area.type, region.type) == ("VIEW_3D", "UI"):
+        return region.active_panel_category == PLACES["VIEW3D"]["bl_category"]
+    return (area.type, region.type) == ("PROPERTIES", "WINDOW") and area.spaces.active.context == "RENDER"
 
 
 def _what_is_baked(context: bpy.types.Context) -> str:

@@ -35,11 +35,12 @@ def find_view(context: bpy.types.Context) -> bpy.types.Area | None:
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Draw every 3D View anew."""
+    """Draw what every 3D View shows anew, and not the tools around it."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type == "VIEW_3D":
-                area.tag_redraw()
+            for region in area.regions:
+                if (area.type, region.type) == ("VIEW_3D", "WINDOW"):
+                    region.tag_redraw()
 
 
 def is_shown(context: bpy.types.Context) -> bool:

@@ -8,13 +8,15 @@ from typing import ClassVar
 import bpy
 
 from ..core.result import BakeResult
-from . import attribute_writer, scene_reader, viewport
+from . import attribute_writer, scene_reader, viewport, wording
 from .job import BakeJob
 from .live_light import LiveLight, Picture
 from .slices import Slices
 
 #: How often the bake is looked after, and how long it may hold up Blender then.
-TICK_SECONDS, SLICE_SECONDS = 0.05, 0.02
+TICK_SECONDS, SLICE_SECONDS = 0.03, 0.02
+#: How long the click waits for the first light. A hand doesn't feel it, and the first that is drawn is light.
+FIRST_LIGHT_SECONDS = 0.1
 
 
 class WindowBake:
@@ -42,10 +44,14 @@ class WindowBake:
         self.job.start(scene, settings)
         self._live = LiveLight(context.scene) if asked.show_while_baking else None
         self._shown: Picture | None = None
+        self._told: tuple[str, str] | None = None
         self._slices: Slices[list[bpy.types.Object]] | None = None
         self._result: BakeResult | None = None
         self._timer = context.window_manager.event_timer_add(TICK_SECONDS, window=context.window)
         WindowBake.running = self
+        if self._live is not None:
+            self.job.wait_for_picture(FIRST_LIGHT_SECONDS)
+            self._show(context)
 
     def advance(self, context: bpy.types.Context) -> BakeResult | None:
         """Do what there is to do at a tick; the result, once it is written. Raises what the bake raises."""
@@ -75,6 +81,11 @@ class WindowBake:
         seconds.update(read=self._read_seconds, write=time.perf_counter() - self._write_begun)
         seconds["total"] += seconds["read"] + seconds["write"]
         return self._result
+
+    def has_news(self) -> bool:
+        """Is there more to tell than at the last call? To draw what has not changed would only slow the bake down."""
+        before, self._told = self._told, (wording.stage(self.job), wording.time_line(self.job))
+        return self._told != before
 
     def close(self) -> None:
         """Leave nothing behind but what has been written to its end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 from .adaptation import Adaptation
@@ -16,8 +17,8 @@ from .direct.sky import divide_sky
 from .memory import Memory
 from .parallel import Workers
 from .patch_refinement import patches_by_light
-from .patches import make_patches, split_objects, unit_space
-from .plan import Effort, Plan, plan
+from .patches import Space, make_patches, split_objects, unit_space
+from .plan import Effort, Plan, choose, price
 from .progress import Progress
 from .receivers import Receivers, make_receivers
 from .refinement import Light, average_light, refine
@@ -27,6 +28,9 @@ from .settings import Settings
 from .survey import Surroundings, Survey, look_up
 from .transport import solve_halves
 from .visibility import Visibility
+
+#: Triangles of the first look at the light.
+_ROUGH = 8_000
 
 
 def bake(
@@ -48,26 +52,27 @@ def bake(
     if recalled is not None:
         return recalled
     given = scene
-    with clock.stage("plan", 0.0):
-        planned = plan(check_scene(scene), settings, effort)
-        check_cost(planned)
-    scene = planned.scene
-    effort = planned.effort
-    clock.progress.expected = planned.seconds
 
     def show(baked: Baked, light: Light) -> None:
         clock.progress.show(lambda: baked.result(light, settings, clock))
 
     with Workers(settings.threads, clock.progress) as workers:
-        with clock.stage("tessellate", 0.03):
+        with clock.stage("plan", 0.0):
+            chosen = choose(check_scene(scene), settings, effort)
+            scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
+            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
+            sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
+            lights += of_sky
+            if clock.progress.watched and lights:
+                show(*first_light(chosen, around, space, lights, settings, workers))
+            planned = price(chosen, settings, fixed=effort is not None)
+            check_cost(planned)
+            effort = planned.effort
+            clock.progress.expected = planned.seconds
+        with clock.stage("tessellate", 0.03):
             start = max(int(effort.triangles / effort.coarsest), 1)
             receivers = make_receivers(scene, space, settings, start)
-            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
-            sky, of_sky = divide_sky(scene, space, suns=planned.active("sky lights"), portals=planned.active("portals"))
-            lights += of_sky
-            if clock.progress.watched:
-                show(*first_light(planned, around, receivers, lights, settings, workers))
             patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1, until=0.28):
@@ -88,14 +93,21 @@ def bake(
 
 
 def first_light(
-    planned: Plan, around: Scene, receivers: Receivers, lights: list[Source], settings: Settings, workers: Workers
+    chosen: Plan, around: Scene, space: Space, lights: list[Source], settings: Settings, workers: Workers
 ) -> tuple[Baked, Light]:
-    """A rough look at the direct light: whoever watches sees within a moment whether it is worth waiting."""
-    patches = make_patches(around, receivers.space, split_objects(around, 1))
+    """A rough look at the direct light, before anything is priced: whoever watches sees within a moment whether it is
+    worth waiting."""
+    receivers = make_receivers(
+        replace(chosen.scene, objects=tuple(replace(o, size=None) for o in chosen.scene.objects)),
+        space,
+        replace(settings, size=None),
+        min(chosen.effort.triangles, _ROUGH),
+    )
+    patches = make_patches(around, space, split_objects(around, 1))
     straight = DirectLight(lights, Visibility(patches.corners, patches.optics), settings.seed)
-    survey = Survey(receivers, straight, None, planned.effort, settings.seed, workers)
+    survey = Survey(receivers, straight, None, chosen.effort, settings.seed, workers)
     survey.run_pass()
-    return Baked(planned, patches, (), survey), average_light(survey)
+    return Baked(chosen, patches, (), survey), average_light(survey)
 
 
 def finer_where_it_matters(

@@ -96,13 +96,21 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
 
     effort: to work just so hard, instead of as hard as the settings call for.
     """
+    return price(choose(scene, settings, effort), settings, fixed=effort is not None)
+
+
+def choose(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan:
+    """What the scene calls for, with no price yet: that takes no time worth mentioning."""
     effects, scene = choose_effects(scene, settings)
-    prices = _Prices(scene, effects, settings)
-    if effort is not None:
-        return prices.of(effort)
-    effort = choose_effort(scene, settings)
+    return Plan(scene, effects, effort or choose_effort(scene, settings), 0, {}, 0.0, 0.0)
+
+
+def price(chosen: Plan, settings: Settings, *, fixed: bool = False) -> Plan:
+    """The chosen plan with its price, and thriftier where there is too little time for it, unless its effort is
+    fixed."""
+    prices, effort = _Prices(chosen, settings), chosen.effort
     planned = prices.of(effort)
-    if settings.seconds is None or planned.seconds <= settings.seconds:
+    if fixed or settings.seconds is None or planned.seconds <= settings.seconds:
         return planned
     # Too little time for all: the least thrift that meets it, by bisection, or as much as still shows something.
     enough, short = _MOST_THRIFT, 0
@@ -133,17 +141,18 @@ def thriftier(effort: Effort, steps: int) -> Effort:
 
 def price_of_accuracy(scene: Scene, settings: Settings, errors: tuple[float, ...] = PRICED_ERRORS) -> dict[float, Plan]:
     """What each error would cost on this scene: one calibration for all, then next to no time."""
-    effects, scene = choose_effects(scene, settings)
     asked = {error: replace(settings, error=error, seconds=None) for error in errors}
-    prices = _Prices(scene, effects, asked[errors[0]])
-    return {error: prices.of(choose_effort(scene, wish)) for error, wish in asked.items()}
+    chosen = choose(scene, asked[errors[0]])
+    prices = _Prices(chosen, asked[errors[0]])
+    return {error: prices.of(choose_effort(chosen.scene, wish)) for error, wish in asked.items()}
 
 
 class _Prices:
     """Plans of one scene by effort; the machine is measured once."""
 
-    def __init__(self, scene: Scene, effects: tuple[Effect, ...], settings: Settings) -> None:
-        self._unpriced = Plan(scene, effects, choose_effort(scene, settings), 0, {}, 0.0, 0.0)
+    def __init__(self, chosen: Plan, settings: Settings) -> None:
+        scene = chosen.scene
+        self._unpriced = chosen
         self._settings = settings
         self._machine = calibrate(scene, settings.threads)
         self._pieces = len(emitting_pieces(scene))

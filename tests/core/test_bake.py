@@ -468,20 +468,49 @@ def test_the_stated_error_is_the_true_one_within_a_factor_of_two(room):
     assert true / 2 <= stated <= true * 2
 
 
-def test_watching_shows_light_from_the_start_and_changes_nothing(build):
-    scene = Scene((build.quad(), build.box(low=(0.2, 0.2, 0), high=(0.5, 0.5, 0.4))), (WHITE,), sky=SKY)
+def shown_while_baking(scene, **asked):
+    """What whoever watches is shown, each with its stage, and the result."""
     shown = []
 
     class Shown(Progress):
         def show(self, so_far):
             shown.append((self.stage, so_far()))
 
-    watched, alone = (preview(scene, progress, triangles=100) for progress in (Shown(watched=True), Progress()))
+    return shown, preview(scene, Shown(watched=True), **asked)
+
+
+def test_watching_shows_light_from_the_start_and_changes_nothing(build):
+    objects = (build.quad(), build.box(low=(0.2, 0.2, 0), high=(0.5, 0.5, 0.4)))
+    scene = Scene(objects, (WHITE,), (PointLamp("lamp", (0.2, 0.2, 2.0), (10.0, 10.0, 10.0)),), SKY)
+    shown, watched = shown_while_baking(scene, triangles=100)
+    alone = preview(scene, triangles=100)
     stages = [stage for stage, _ in shown]
-    assert stages[0] == "tessellate"
+    assert stages[0] == "plan"
     assert {"gather", "fit"} <= set(stages)
     for one, two in zip(watched.objects, alone.objects, strict=True):
         assert np.array_equal(one.layers["combined"], two.layers["combined"])
     # The last picture is the result; the first, rough one has no bounce yet, and nobody knows its error.
     assert np.array_equal(shown[-1][1].objects[0].layers["combined"], watched.objects[0].layers["combined"])
-    assert shown[0][1].report.estimated_error == {}
+    first = shown[0][1]
+    assert first.report.estimated_error == {}
+    assert first.objects[0].layers["direct"].any()
+    assert not first.objects[0].layers["indirect"].any()
+
+
+def test_the_first_look_is_rough_whatever_is_asked(build):
+    scene = Scene((build.quad(),), (WHITE,), (PointLamp("lamp", (0.2, 0.2, 2.0), (10.0, 10.0, 10.0)),))
+
+    class First(Progress):
+        def show(self, so_far):
+            self.triangles = len(so_far().objects[0].triangles)
+            self.cancel()
+
+    progress = First(watched=True)
+    with pytest.raises(Cancelled):
+        preview(scene, progress, size=0.002)  # a million of them
+    assert 1_000 < progress.triangles < 20_000
+
+
+def test_where_only_the_sky_shines_there_is_no_black_first_look(build):
+    shown, _ = shown_while_baking(Scene((build.quad(),), (WHITE,), sky=SKY), triangles=100)
+    assert shown[0][1].objects[0].layers["combined"].any()
