@@ -18,6 +18,7 @@ from .memory import Memory
 from .parallel import Workers
 from .patch_refinement import patches_by_light
 from .patches import Space, make_patches, split_objects, unit_space
+from .pilot import Pilot
 from .plan import Effort, Plan, choose, price
 from .progress import Progress
 from .receivers import Receivers, make_receivers
@@ -58,15 +59,18 @@ def bake(
 
     with Workers(settings.threads, clock.progress) as workers:
         with clock.stage("plan", 0.0):
-            chosen = choose(check_scene(scene), settings, effort)
+            scene = check_scene(scene)
+            pilot = Pilot(scene)
+            chosen = choose(scene, settings, pilot, effort)
             scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
-            lights = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
+            others = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
             sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
-            lights += of_sky
+            lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
-            planned = price(chosen, settings, fixed=effort is not None)
+            planned = price(chosen, settings, pilot, fixed=effort is not None)
+            del pilot  # it holds a copy of the scene
             check_cost(planned)
             effort = planned.effort
             clock.progress.expected = planned.seconds
@@ -82,7 +86,10 @@ def bake(
             receivers, rays = finer_where_it_matters(
                 scene, receivers, direct_light, surroundings, effort, settings.seed, workers
             )
-        survey = Survey(receivers, direct_light, surroundings, effort, settings.seed, workers)
+        sampled, sky_light = direct_light, None
+        if of_sky and "sky" in settings.layers:
+            sampled, sky_light = (DirectLight(part, visibility, settings.seed) for part in (others, of_sky))
+        survey = Survey(receivers, sampled, surroundings, effort, settings.seed, workers, sky_light)
         survey.rays.update(rays)
         baked = Baked(planned, patches, halves, survey)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))

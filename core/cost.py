@@ -14,11 +14,10 @@ from time import perf_counter
 import numpy as np
 
 from .parallel import Workers, thread_count
-from .patches import make_patches, split_objects, unit_space
+from .pilot import Pilot
 from .progress import Progress
 from .sampling import stream
-from .scene import Scene, SceneError
-from .visibility import Visibility
+from .scene import SceneError
 
 #: Rays, and numbers, that measure how fast this machine is.
 _CALIBRATION = 1 << 15
@@ -68,11 +67,10 @@ class Machine:
         return self.ray * (looks + work.transport) + self.number * (shared / self.threads + alone)
 
 
-def calibrate(scene: Scene, threads: int) -> Machine:
+def calibrate(pilot: Pilot, threads: int) -> Machine:
     """Trace a few thousand rays on as many threads as the bake will have (0: all)."""
     threads = thread_count(threads)
-    patches = make_patches(scene, unit_space(scene), split_objects(scene, 2048))
-    visibility = Visibility(patches.corners)
+    patches, visibility = pilot.patches, pilot.visibility
     rng = stream(0, "calibration")
     chosen = rng.choice(len(patches.area), size=_CALIBRATION, p=patches.area / patches.area.sum())
     directions = rng.normal(size=(_CALIBRATION, 3))

@@ -29,8 +29,9 @@ MOST_PANELS, LARGE_PART = 64, 0.1
 #: Each kind of lamp, by the name of its effect.
 LAMPS: dict[str, type] = {"point lamps": PointLamp, "spot lamps": SpotLamp, "sun": SunLamp, "area lamps": AreaLamp}
 
-#: What is sampled as a light is not told from lamps afterwards.
-_WHOLE_SKY = "the layer Sky is asked for, and holds what rays find"
+#: What is left out with the sky, and why where nothing of it is to be seen.
+_OF_SKY = ("sky", "sky map", "sky lights", "portals")
+_HIDDEN = "every ray that leaves a receiver hits something"
 
 
 @dataclass(frozen=True)
@@ -41,15 +42,22 @@ class Rule:
     without: Callable[[Scene], Scene]
 
 
-def choose_effects(scene: Scene, settings: Settings) -> tuple[tuple[Effect, ...], Scene]:
+def choose_effects(scene: Scene, settings: Settings, *, sees_sky: bool = True) -> tuple[tuple[Effect, ...], Scene]:
     """Each effect, whether it is simulated, and why; and the scene without those that are not.
 
-    settings.effects overrides what the scene calls for. Raises SceneError for an effect that does not exist.
+    settings.effects overrides what the scene calls for. sees_sky: whether rays from the receivers can find the sky.
+    Raises SceneError for an effect that does not exist.
     """
     for name in settings.effects:
         if name not in EFFECTS:
             raise SceneError(f"There is no effect '{name}': choose from {', '.join(EFFECTS)}.")
-    effects = tuple(_overridden(rule.judge(scene, settings), settings.effects) for rule in EFFECTS.values())
+    hidden = not sees_sky and not settings.effects.get("sky")
+    effects = tuple(
+        Effect(name, False, _HIDDEN)
+        if hidden and name in _OF_SKY
+        else _overridden(rule.judge(scene, settings), settings.effects)
+        for name, rule in EFFECTS.items()
+    )
     for effect in effects:
         if not effect.active:
             scene = EFFECTS[effect.name].without(scene)
@@ -115,11 +123,9 @@ def sky_map(scene: Scene, _: Settings) -> Effect:
     return Effect("sky map", False, "the world is the same in all directions")
 
 
-def sky_lights(scene: Scene, settings: Settings) -> Effect:
+def sky_lights(scene: Scene, _: Settings) -> Effect:
     if not isinstance(scene.sky, SkyMap):
         return Effect("sky lights", False, "the world is the same in all directions")
-    if "sky" in settings.layers:
-        return Effect("sky lights", False, _WHOLE_SKY)
     count = len(split_bright(scene.sky)[1])
     if not count:
         return Effect("sky lights", False, "nothing in the sky is much brighter than the rest of it")
@@ -128,13 +134,15 @@ def sky_lights(scene: Scene, settings: Settings) -> Effect:
 
 
 def portals(scene: Scene, settings: Settings) -> Effect:
-    if not scene.portals:
-        return Effect("portals", False, "no area lamp is a portal")
     if not sky(scene, settings).active:
         return Effect("portals", False, "the world is black")
-    if "sky" in settings.layers:
-        return Effect("portals", False, _WHOLE_SKY)
-    return Effect("portals", True, f"the sky shines through {_names([portal.name for portal in scene.portals])}")
+    if not scene.portals:
+        return Effect("portals", False, "no area lamp is a portal, and rays find the sky well enough")
+    placed = [portal.name for portal in scene.portals if not portal.found]
+    found = len(scene.portals) - len(placed)
+    ways = [_names(placed)] * bool(placed)
+    ways += ["an opening that was found" if found == 1 else f"{found} openings that were found"] * bool(found)
+    return Effect("portals", True, f"the sky shines through {' and '.join(ways)}")
 
 
 def bounces(scene: Scene, settings: Settings) -> Effect:
@@ -175,6 +183,36 @@ def clear_glass(scene: Scene, _: Settings) -> Effect:
     glass = _used(scene, lambda surface: max(surface.glass) > 0.0)
     reason = f"rays go straight through {_names(glass)}"
     return Effect("clear glass", bool(glass), reason if glass else "no surface is clear glass")
+
+
+def power_by_area(scene: Scene) -> float:
+    """About how much light other than the sky's falls on the surfaces, W/m^2: what lamps and emitting surfaces give
+    off, over all of them. Suns are left out: of their light little may get in."""
+    area = power = 0.0
+    for scene_object in scene.objects:
+        own = triangle_geometry(scene_object.vertices[scene_object.triangles])[1]
+        area += float(own.sum())
+        power += np.pi * float(own @ triangle_emission(scene, scene_object).mean(axis=1))
+    return (power + sum(_power(lamp) for lamp in scene.lamps)) / area if area else 0.0
+
+
+def _power(lamp: Lamp) -> float:
+    """W, mean over the channels; none of a sun."""
+    match lamp:
+        case SunLamp():
+            return 0.0
+        case AreaLamp():
+            sides = 4.0 * np.linalg.norm(np.cross(lamp.half_u, lamp.half_v))
+            return float(np.pi * np.mean(lamp.radiance) * sides * (1.0 if lamp.shape == "rectangle" else np.pi / 4.0))
+        case SpotLamp():
+            return float(2.0 * np.pi * (1.0 - np.cos(lamp.cone_angle / 2.0)) * np.mean(lamp.intensity))
+        case PointLamp():
+            return float(4.0 * np.pi * np.mean(lamp.intensity))
+
+
+def mean_of_sky(scene: Scene) -> float:
+    """Mean radiance over all directions and channels."""
+    return float(equal_texels(scene.sky, 1, 1).mean() if isinstance(scene.sky, SkyMap) else np.mean(scene.sky))
 
 
 def goes_on(scene: Scene) -> bool:

@@ -9,7 +9,18 @@ import numpy as np
 from .cost import Work, calibrate
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
-from .effects import LAMPS, choose_effects, emitters_by_rays, goes_on
+from .effects import (
+    LAMPS,
+    choose_effects,
+    emitters_by_rays,
+    goes_on,
+    mean_of_sky,
+    power_by_area,
+    sky,
+    sky_lights,
+)
+from .openings import find_openings
+from .pilot import Pilot, look_for_sky
 from .result import Effect
 from .scene import Scene
 from .settings import Settings
@@ -34,6 +45,8 @@ _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6
+#: Noise of what the rays of one point say of the sky, relative to all light, above which openings are looked for.
+_SHOWS = 0.1
 #: What finding where light bends takes for each cell in the end: rays, and fits.
 _BEND_RAYS, _BEND_FITS = 100, 2
 #: Each step of thrift leaves this share of the work.
@@ -96,19 +109,21 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
 
     effort: to work just so hard, instead of as hard as the settings call for.
     """
-    return price(choose(scene, settings, effort), settings, fixed=effort is not None)
+    pilot = Pilot(scene)
+    return price(choose(scene, settings, pilot, effort), settings, pilot, fixed=effort is not None)
 
 
-def choose(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan:
-    """What the scene calls for, with no price yet: that takes no time worth mentioning."""
-    effects, scene = choose_effects(scene, settings)
+def choose(scene: Scene, settings: Settings, pilot: Pilot, effort: Effort | None = None) -> Plan:
+    """What the scene calls for, with no price yet: that takes no time worth mentioning, but under a sky some rays."""
+    scene, sees_sky = _look_for_sky(scene, settings, pilot)
+    effects, scene = choose_effects(scene, settings, sees_sky=sees_sky)
     return Plan(scene, effects, effort or choose_effort(scene, settings), 0, {}, 0.0, 0.0)
 
 
-def price(chosen: Plan, settings: Settings, *, fixed: bool = False) -> Plan:
+def price(chosen: Plan, settings: Settings, pilot: Pilot, *, fixed: bool = False) -> Plan:
     """The chosen plan with its price, and thriftier where there is too little time for it, unless its effort is
     fixed."""
-    prices, effort = _Prices(chosen, settings), chosen.effort
+    prices, effort = _Prices(chosen, settings, pilot), chosen.effort
     planned = prices.of(effort)
     if fixed or settings.seconds is None or planned.seconds <= settings.seconds:
         return planned
@@ -142,19 +157,37 @@ def thriftier(effort: Effort, steps: int) -> Effort:
 def price_of_accuracy(scene: Scene, settings: Settings, errors: tuple[float, ...] = PRICED_ERRORS) -> dict[float, Plan]:
     """What each error would cost on this scene: one calibration for all, then next to no time."""
     asked = {error: replace(settings, error=error, seconds=None) for error in errors}
-    chosen = choose(scene, asked[errors[0]])
-    prices = _Prices(chosen, asked[errors[0]])
+    pilot = Pilot(scene)
+    chosen = choose(scene, asked[errors[0]], pilot)
+    prices = _Prices(chosen, asked[errors[0]], pilot)
     return {error: prices.of(choose_effort(chosen.scene, wish)) for error, wish in asked.items()}
+
+
+def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene, bool]:
+    """The scene with portals where the sky shines into rooms, if rays would find it with noise that shows; and whether
+    it is to be seen at all. A sky that could bring more than a tenth of the asked error by ways that are too narrow for
+    the rays counts as seen."""
+    if not settings.effects.get("sky", True) or not sky(scene, settings).active:
+        return scene, True
+    found = look_for_sky(pilot)
+    unseen, others = np.pi * mean_of_sky(scene), power_by_area(scene)
+    error = asked_error(settings)
+    if found.none:
+        return scene, unseen * found.doubt > error / 10.0 * others or sky_lights(scene, settings).active
+    noise = unseen * np.sqrt(found.openness / gather_rays(error))
+    if not settings.effects.get("portals", True) or noise <= _SHOWS * (unseen * found.openness + others):
+        return scene, True
+    return replace(scene, portals=(*scene.portals, *find_openings(found, pilot))), True
 
 
 class _Prices:
     """Plans of one scene by effort; the machine is measured once."""
 
-    def __init__(self, chosen: Plan, settings: Settings) -> None:
+    def __init__(self, chosen: Plan, settings: Settings, pilot: Pilot) -> None:
         scene = chosen.scene
         self._unpriced = chosen
         self._settings = settings
-        self._machine = calibrate(scene, settings.threads)
+        self._machine = calibrate(pilot, settings.threads)
         self._pieces = len(emitting_pieces(scene))
         self._own = sum(len(o.triangles) for o in scene.objects)
         self._cells: dict[int, int] = {}
@@ -221,7 +254,7 @@ class _Prices:
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
-    asked = settings.error or (0.02 if settings.seconds is None else 0.01)
+    asked = asked_error(settings)
     finer = min(max(0.02 / asked, 0.25), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
@@ -243,6 +276,11 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         threshold=1e-5,
         emitters_by_rays=emitters_by_rays(scene),
     )
+
+
+def asked_error(settings: Settings) -> float:
+    """The relative error to aim at; by the clock, as small as time allows."""
+    return settings.error or (0.02 if settings.seconds is None else 0.01)
 
 
 def gather_rays(error: float) -> int:

@@ -197,6 +197,8 @@ def _light(
         reflected = values[1][:, :3]
         sky = values[1][:, around.sky] @ around.hemispheres.sky.irradiance
         emitted = values[1][:, around.emitted] if around.emitted.stop > around.emitted.start else dark
+    if survey.tells_sky_apart:
+        sky = sky + values[0][:, 3:]
     return Light(
         reflected=reflected,
         sky=sky,

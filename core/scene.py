@@ -233,7 +233,7 @@ class Portal:
     """A rectangle in a window, through which the sky shines into a room: it gives no light, but tells where to look.
 
     half_u, half_v: from the centre to the middle of two neighbouring sides, at right angles. normal: unit vector at
-    right angles to both, into the room.
+    right angles to both, into the room. found: by rays (core.openings), rather than made by a person.
     """
 
     name: str
@@ -241,6 +241,7 @@ class Portal:
     half_u: Vector
     half_v: Vector
     normal: Vector
+    found: bool = False
 
 
 @dataclass(frozen=True, eq=False)

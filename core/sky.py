@@ -62,7 +62,7 @@ class Sky:
         """Texels (n,) of straight rays, with the dark one for those that leave through a portal."""
         through = np.zeros(len(texel), dtype=bool)
         for portal in self.portals:
-            through |= portal.crossed(origins, directions)
+            through |= portal.crossed(origins.T, directions.T)
         return np.where(through, np.int32(len(self.light) - 1), texel)
 
 
@@ -80,18 +80,36 @@ class Rectangle:
         half_u, half_v = np.array(portal.half_u) / space.metres, np.array(portal.half_v) / space.metres
         return Rectangle(space.normalise(np.array(portal.center)), half_u, half_v, np.array(portal.normal))
 
+    @property
+    def corners(self) -> Float64:
+        """(4, 3), counter-clockwise seen from the room."""
+        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
+        if np.cross(self.half_u, self.half_v) @ self.normal < 0:
+            outline = outline[::-1]
+        return np.asarray(self.center + outline @ np.stack([self.half_u, self.half_v]))
+
     def crossed(self, origins: Float32, directions: Float32) -> Bool:
-        """Which rays (n, 3) cross it from the room outward."""
-        away = origins - self.center.astype(np.float32)
-        normal = self.normal.astype(np.float32)
-        height, fall = away @ normal, -(directions @ normal)
-        ahead = np.flatnonzero((height > 0) & (fall > 0))
-        inside = np.zeros(len(origins), dtype=bool)
-        place = away[ahead] + directions[ahead] * (height[ahead] / fall[ahead])[:, None]
-        inside[ahead] = True
+        """Which rays cross it from the room outward; origins and directions (3, ...) broadcast."""
+
+        def along(axis: Float64, vectors: Float32) -> Float32:
+            return np.asarray(np.tensordot(axis.astype(np.float32), vectors, axes=1))
+
+        away = origins - self.center.astype(np.float32).reshape(3, *[1] * (origins.ndim - 1))
+        height, fall = along(self.normal, away), -along(self.normal, directions)
+        outward = (height > 0) & (fall > 0)
+        reach = height / np.where(outward, fall, np.float32(1))
         for half in (self.half_u, self.half_v):
-            inside[ahead] &= np.abs(place @ (half / (half @ half)).astype(np.float32)) <= 1
-        return inside
+            axis = half / (half @ half)
+            outward &= np.abs(along(axis, away) + reach * along(axis, directions)) <= 1
+        return outward
+
+    def may_be_crossed_with(self, other: Rectangle) -> bool:
+        """Whether some ray crosses both outward: not if each lies on the inner side of the other."""
+        within = [
+            ((one.corners - two.center) @ two.normal).min() > -1e-6 * np.abs(one.corners - two.center).max()
+            for one, two in ((self, other), (other, self))
+        ]
+        return not all(within)
 
 
 def equal_texels(sky: SkyMap, rows: int, columns: int) -> Float64:

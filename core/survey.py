@@ -117,8 +117,9 @@ def dark(total: Float64, direct: Float64, mean: float) -> Bool:
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
-    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue. coarser: for each
-    half (c,) the change that coarser patches make to the mean irradiance, by one pass each: that is sure enough.
+    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue, and once more for
+    sky_light, if that is to be told from the rest. coarser: for each half (c,) the change that coarser patches make to
+    the mean irradiance, by one pass each: that is sure enough.
     """
 
     def __init__(
@@ -129,18 +130,21 @@ class Survey:
         effort: Effort,
         seed: int,
         workers: Workers,
+        sky_light: DirectLight | None = None,
     ) -> None:
         count = len(receivers.cells)
         self.receivers = receivers
         self.surroundings = surroundings
         to_grey = surroundings.to_grey if surroundings else np.zeros(0)
         self.indirect = [Samples(count, to_grey), Samples(count, to_grey)]
-        self.direct = [Samples(count, np.full(3, 1 / 3)), Samples(count, np.full(3, 1 / 3))]
+        channels = np.full(6 if sky_light else 3, 1 / 3)
+        self.direct = [Samples(count, channels), Samples(count, channels)]
         self.coarser = [np.zeros(count), np.zeros(count)]
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
         self.rays: Counter[str] = Counter()
         self._light = direct_light
+        self._sky_light = sky_light
         self._effort = effort
         self.seed = seed
         self.workers = workers
@@ -148,6 +152,11 @@ class Survey:
         self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
         self._mean = 0.0
+
+    @property
+    def tells_sky_apart(self) -> bool:
+        """Whether the direct light has channels of its own for the sky's."""
+        return self._sky_light is not None
 
     @property
     def valid_samples(self) -> Float64:
@@ -179,7 +188,7 @@ class Survey:
         values = arriving[:, :columns]
         if number < 2:
             self.coarser[half] = arriving[:, columns] - values[:, :3].mean(axis=1)
-        direct = light.irradiance.mean(axis=1)
+        direct = light.grey
         total = values @ around.to_grey + direct
         self._mean = float(total.mean())
         valid = ~out_of_sight(points, around.hemispheres, enclosed, total, direct, self._mean)
@@ -219,7 +228,7 @@ class Survey:
                 points, around.hemispheres, table, self.seed, 3_000_000 + k, self.workers
             )
             self.rays += rays
-            direct = light.irradiance.mean(axis=1)
+            direct = light.grey
             chosen = chosen[enclosed & dark(arriving @ around.to_grey + direct, direct, self._mean)]
         element = self.receivers.cells.element
         seen = np.ones(len(element), dtype=bool)
@@ -250,11 +259,17 @@ class Survey:
 
     def _direct(self, points: Points, number: int) -> Illumination:
         light = gather_direct(points, self._light, self._effort.shadow_rays, self.seed, number, self.workers)
+        if self._sky_light:
+            apart = 4_000_000 + number
+            light = light.beside(
+                gather_direct(points, self._sky_light, self._effort.shadow_rays, self.seed, apart, self.workers)
+            )
         self.rays += light.rays
         return light
 
     def _add_direct(
         self, half: int, index: NDArray[np.int64] | slice, points: Points, light: Illumination, valid: Bool
     ) -> None:
-        noise = np.sqrt(light.variance).mean(axis=1) ** 2
+        deviation = np.sqrt(light.variance).reshape(len(light.variance), -1, 3).mean(axis=2)
+        noise = (deviation**2).sum(axis=1)
         self.direct[half % 2].add(index, points.barycentric, light.irradiance, noise, valid)

@@ -24,13 +24,28 @@ MOST_ASKED = 16
 
 @dataclass(frozen=True, eq=False)
 class Illumination:
-    """irradiance (n, 3) W/m^2 and its variance (n, 3); signature (n,) int64: equal numbers see the same lights whole,
-    and -1 sees some light in part; rays cast, by purpose."""
+    """irradiance (n, 3) W/m^2 and its variance (n, 3), or more channels where some lights are told apart; signature
+    (n,) int64: equal numbers see the same lights whole, and -1 sees some light in part; rays cast, by purpose."""
 
     irradiance: Float64
     variance: Float64
     signature: np.ndarray
     rays: Counter[str]
+
+    @property
+    def grey(self) -> Float64:
+        """(n,) mean over red, green and blue."""
+        return np.asarray(self.irradiance.sum(axis=1) / 3.0)
+
+    def beside(self, other: Illumination) -> Illumination:
+        """Both, told apart by their channels."""
+        partly = (self.signature < 0) | (other.signature < 0)
+        return Illumination(
+            np.concatenate([self.irradiance, other.irradiance], axis=1),
+            np.concatenate([self.variance, other.variance], axis=1),
+            np.where(partly, -1, self.signature + other.signature),
+            self.rays + other.rays,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +196,7 @@ class DirectLight:
         ways = light.aim(points, unit)
         towards = ways.towards
         weights = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
-        gains = light.gain(ways)
+        gains = light.gain(points, ways)
         # One plane, or one for each channel.
         brings = (weights if gains is None else weights * gains).reshape(-1, *weights.shape)
         free = brings.max(axis=0) == 0

@@ -3,8 +3,8 @@
 Every lamp answers three questions, for points in the unit box:
 - `share(points, normals)`: how much of its light arrives, (n,), as if it shone evenly: irradiance = share * colour;
 - `aim(points, unit)`: ways from the points to places spread over the lamp, and how much of its sky each stands for;
-- `gain(ways)`: how much of an even lamp's light it really sends along these ways, (r, n) or by channel (3, r, n), or
-  None for all of it.
+- `gain(points, ways)`: how much of an even lamp's light it really sends along these ways, (r, n) or by channel
+  (3, r, n), or None for all of it.
 The mean over all ways of cos(receiver, way) * solid is the share, where nothing is in the way. The arrays of ways have
 components and samples first, (3, r, n), in single precision: numpy then runs along the points.
 """
@@ -58,7 +58,7 @@ class Light(Protocol):
 
     def aim(self, points: Float32, unit: Float32) -> Ways: ...
 
-    def gain(self, ways: Ways) -> Float32 | None: ...
+    def gain(self, points: Float32, ways: Ways) -> Float32 | None: ...
 
 
 def place(lamp: Lamp, space: Space) -> Light:
@@ -132,7 +132,7 @@ class Ball:
         aside = (x * radius) * first[:, None] + (y * radius) * second[:, None]
         return _spread((axis * height)[:, None] + aside, height[None], (radius / np.float32(self.radius)) ** 2)
 
-    def gain(self, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+    def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
     def _silhouette(self, distance: NDArray[Real]) -> tuple[NDArray[Real], NDArray[Real]]:
@@ -169,7 +169,7 @@ class Spot(Ball):
         share[reached] = super().share(points[reached], normals[reached])
         return share
 
-    def gain(self, ways: Ways) -> Float32:
+    def gain(self, points: Float32, ways: Ways) -> Float32:  # noqa: ARG002 - it shines alike from all its points
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
         local = np.tensordot(self.inverse_axes.T.astype(np.float32), ways.towards, axes=1)
         depth = local[2] / np.sqrt(np.maximum((local * local).sum(axis=0), np.float32(1e-30)))
@@ -207,7 +207,7 @@ class Sun:
         towards = BEYOND * axis[:, None] + reach * (x * first[:, None] + y * second[:, None])
         return _spread(towards, depth, float(BEYOND) ** 2 * (1 + self.tangent**2))
 
-    def gain(self, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
+    def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
 
@@ -319,7 +319,7 @@ class Panel:
         offset = (places - from_origin[:, None]) / size[:, None]
         return towards, solid, (offset * offset).sum(axis=0) <= 1 if self.round else np.ones_like(x, dtype=bool)
 
-    def gain(self, ways: Ways) -> Float32 | None:
+    def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - all that counts is the way
         """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
         (tan h - tan a) / (tan h - h), as Cycles does it, a being the angle off the axis and h half the spread."""
         if self.half_spread >= np.pi / 2 - 1e-6:

@@ -30,20 +30,23 @@ def divide_sky(scene: Scene, space: Space, *, suns: bool, portals: bool) -> tupl
     sky = Sky.of(smooth)
     shining = scene.portals if portals and sky.light.any() else ()
     rectangles = [Rectangle.of(portal, space) for portal in shining]
-    windows = [Window(portal.name, rectangle, sky) for portal, rectangle in zip(shining, rectangles, strict=True)]
+    windows = [
+        Window(portal.name, rectangle, sky, rectangles[:number])
+        for number, (portal, rectangle) in enumerate(zip(shining, rectangles, strict=True))
+    ]
     return sky.without(rectangles), [*(place(sun, space) for sun in bright), *windows]
 
 
 class Window(Panel):
-    """The sky behind a portal, as an area lamp: it shines from the rectangle, but its shadow rays go on to the sky."""
+    """The sky behind a portal, as an area lamp: it shines from the rectangle, but its shadow rays go on to the sky.
 
-    def __init__(self, name: str, portal: Rectangle, sky: Sky) -> None:
-        outline = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]], dtype=float)
-        if np.cross(portal.half_u, portal.half_v) @ portal.normal < 0:
-            outline = outline[::-1]
-        corners = portal.center + outline @ np.stack([portal.half_u, portal.half_v])
-        super().__init__(name, corners, np.zeros(3), two_sided=False)
+    What leaves through one of the portals before it as well, is theirs.
+    """
+
+    def __init__(self, name: str, portal: Rectangle, sky: Sky, before: list[Rectangle]) -> None:
+        super().__init__(name, portal.corners, np.zeros(3), two_sided=False)
         self._sky = sky
+        self._before = [other for other in before if portal.may_be_crossed_with(other)]
         self._even = sky.light.shape[1] == 1
         self.color = sky.irradiance[0] if self._even else sky.light.mean(axis=0).astype(np.float64)
 
@@ -52,13 +55,16 @@ class Window(Panel):
         stretch = BEYOND * ways.inverse
         return Ways(ways.towards * stretch, ways.inverse / np.maximum(stretch, np.float32(1e-30)), ways.solid)
 
-    def gain(self, ways: Ways) -> Float32 | None:
-        """The sky's radiance along the ways relative to its mean, channel by channel (3, r, n)."""
+    def gain(self, points: Float32, ways: Ways) -> Float32 | None:
+        """The sky's radiance along the ways relative to its mean, (r, n) or channel by channel (3, r, n)."""
+        own = [~other.crossed(points[:, None], ways.towards) for other in self._before]
+        alone = np.logical_and.reduce(own).astype(np.float32) if own else None
         if self._even:
-            return None
+            return alone
         directions = (ways.towards * ways.inverse).reshape(3, -1).T
         light = self._sky.light[self._sky.texel(directions)].T.reshape(ways.towards.shape)
-        return light / np.maximum(self.color, 1e-30).astype(np.float32)[:, None, None]
+        relative = light / np.maximum(self.color, 1e-30).astype(np.float32)[:, None, None]
+        return relative if alone is None else relative * alone
 
 
 @lru_cache(maxsize=2)

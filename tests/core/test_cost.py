@@ -9,6 +9,7 @@ import pytest
 from radiosity_baker.core import bake as pipeline
 from radiosity_baker.core import cost
 from radiosity_baker.core.cost import Machine, Work, calibrate, free_memory_mb, refuse_without_room
+from radiosity_baker.core.pilot import Pilot
 from radiosity_baker.core.scene import Scene, SceneError
 from radiosity_baker.core.settings import Settings
 
@@ -16,8 +17,8 @@ MACHINE = Machine(ray=1e-6, number=1e-8, closed=0.5, threads=2)
 
 
 def test_the_machine_is_measured_on_the_scene(build):
-    open_floor = calibrate(Scene((build.quad(),), (build.grey,)), 1)
-    room = calibrate(Scene((build.box(inward=True),), (build.grey,)), 2)
+    open_floor = calibrate(Pilot(Scene((build.quad(),), (build.grey,))), 1)
+    room = calibrate(Pilot(Scene((build.box(inward=True),), (build.grey,))), 2)
     assert open_floor.closed < 0.01
     assert room.closed > 0.99
     assert (open_floor.threads, room.threads) == (1, 2)

@@ -1,0 +1,145 @@
+"""A few rays before the bake: what they cost on this machine, and where they find the sky."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from .patches import Patches, make_patches, split_objects, unit_space
+from .sampling import cosine_patterns, frames, stream
+from .scene import Bool, Float32, Float64, Int32, Scene
+from .tessellation import Int64
+from .visibility import Path, Visibility, offset_along
+
+#: Patches of a scene for pilot rays.
+_PATCHES = 2048
+#: Points of the receivers and rays from each; the same again, until so many rays have found the sky from inside rooms.
+_POINTS, _RAYS, _ROUNDS, _ENOUGH = 1024, 32, 4, 200
+#: Share of a point's rays that escape up to which it lies inside a room: beyond, rays find the sky well enough.
+_NARROW = 0.25
+#: Of rays that all find nothing, so many over their number may find something: less likely than one in a thousand.
+_SURE = 7.0
+#: Where no ray has found the sky: paths from the receivers, and how often each is scattered.
+_PATHS, _TURNS = 4096, 8
+
+
+@dataclass(frozen=True, eq=False)
+class Pilot:
+    """A scene in a few patches, made ready for rays once there is need of them.
+
+    Raises SceneError then when no object of the scene is there for light.
+    """
+
+    scene: Scene
+
+    @cached_property
+    def patches(self) -> Patches:
+        around = self.scene.surroundings()
+        return make_patches(around, unit_space(self.scene), split_objects(around, _PATCHES))
+
+    @cached_property
+    def visibility(self) -> Visibility:
+        return Visibility(self.patches.corners, self.patches.optics)
+
+    def look_around(self, points: Float64, normals: Float64, rays: int, rng: np.random.Generator) -> Look:
+        """Cosine-distributed rays from points (n, 3) on surfaces with unit normals (n, 3), n * rays of them."""
+        turn = rng.random(len(points), dtype=np.float32) * np.float32(2.0 * np.pi)
+        pattern = cosine_patterns(len(points), rays, rng)
+        directions = (pattern @ frames(normals.astype(np.float32), turn)).reshape(-1, 3)
+        origins = np.repeat(offset_along(points, normals), rays, axis=0)
+        return Look(origins, directions, self.visibility.follow(origins, directions, rng))
+
+    def on_receivers(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64]:
+        """Points (n, 3) spread at random over the receivers, and the normals (n, 3) there."""
+        corners = np.concatenate([o.vertices[o.triangles] for o in self.scene.receivers()])
+        corners = self.patches.space.normalise(corners)
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        double_area = np.linalg.norm(normals, axis=1)
+        chosen = rng.choice(len(corners), size=count, p=double_area / double_area.sum())
+        return _somewhere_in(corners[chosen], rng), normals[chosen] / double_area[chosen, None]
+
+    def where_hit(self, path: Path, rng: np.random.Generator) -> tuple[Float64, Float64]:
+        """A point of each triangle that was hit, and its normal on that side; of rays that hit something."""
+        triangle = path.hit[path.hit >= 0]
+        normals, way = self.patches.normals[triangle], path.directions[path.hit >= 0]
+        side = -np.sign(np.einsum("nk,nk->n", normals, way))
+        return _somewhere_in(self.patches.corners[triangle], rng), normals * side[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """Rays (n, 3) in the unit box, and where they ended."""
+
+    origins: Float32
+    directions: Float32
+    path: Path
+
+    @property
+    def escaped(self) -> Bool:
+        return np.asarray(self.path.hit == -1)
+
+    @property
+    def straight(self) -> Bool:
+        """Which end in the direction in which they began."""
+        return np.asarray(np.einsum("nk,nk->n", self.path.directions, self.directions) > 1.0 - 1e-5)
+
+
+@dataclass(frozen=True, eq=False)
+class Escapes:
+    """How rays from the receivers found the sky.
+
+    origins, directions (n, 3) float32 in the unit box, of those that left straight from points that see little of it;
+    openness: the share of the rays from such points that did. none: no ray did from anywhere, straight or not; then up
+    to a share `doubt` of all rays may all the same.
+    """
+
+    origins: Float32
+    directions: Float32
+    openness: float
+    none: bool
+    doubt: float
+
+    def __len__(self) -> int:
+        return len(self.origins)
+
+    def only(self, chosen: Bool | Int32 | Int64) -> Escapes:
+        return replace(self, origins=self.origins[chosen], directions=self.directions[chosen])
+
+
+def look_for_sky(pilot: Pilot) -> Escapes:
+    """Rays from the receivers until enough have left, or it is clear that hardly any do."""
+    found: list[Look] = []
+    inside, escaped, within = 0, False, 0
+    for number in range(_ROUNDS):
+        rng = stream(0, "look for sky", number)
+        look = pilot.look_around(*pilot.on_receivers(_POINTS, rng), _RAYS, rng)
+        narrow = np.repeat(look.escaped.reshape(-1, _RAYS).mean(axis=1) <= _NARROW, _RAYS)
+        kept = look.escaped & narrow & look.straight
+        found.append(Look(look.origins[kept], look.directions[kept], look.path))
+        inside += int(kept.sum())
+        within += int(narrow.sum())
+        escaped |= bool(look.escaped.any())
+        if inside >= _ENOUGH or (escaped and not inside):
+            break
+    origins, directions = (np.concatenate([getattr(f, name) for f in found]) for name in ("origins", "directions"))
+    none = not escaped and not _wanders_out(pilot)
+    return Escapes(origins, directions, inside / max(within, 1), none, _SURE / (len(found) * _POINTS * _RAYS))
+
+
+def _wanders_out(pilot: Pilot) -> bool:
+    """Whether some path of light from the receivers ends in the sky, after any number of turns."""
+    rng = stream(0, "wander")
+    points, normals = pilot.on_receivers(_PATHS, rng)
+    for _ in range(_TURNS):
+        look = pilot.look_around(points, normals, 1, rng)
+        if look.escaped.any():
+            return True
+        points, normals = pilot.where_hit(look.path, rng)
+    return False
+
+
+def _somewhere_in(corners: Float64, rng: np.random.Generator) -> Float64:
+    """A random point (n, 3) of each triangle (n, 3, 3)."""
+    return np.einsum("nc,nck->nk", rng.dirichlet((1.0, 1.0, 1.0), len(corners)), corners)
