@@ -1,8 +1,19 @@
 """Blender's half: reads the scene, runs the bake, writes the attributes and draws the panel."""
 
-from . import copies, headless, light_materials, operators, panels, presets, properties, translations, viewport
+from . import (
+    copies,
+    headless,
+    light_materials,
+    operators,
+    panels,
+    planning,
+    presets,
+    properties,
+    translations,
+    viewport,
+)
 
-WINDOW = (translations, copies, viewport, light_materials, properties, operators, presets, panels)
+WINDOW = (translations, copies, viewport, light_materials, properties, planning, operators, presets, panels)
 
 
 def register() -> None:

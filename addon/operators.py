@@ -5,21 +5,28 @@ the bake to a worker thread and looks in twenty times a second; what the bake wr
 these ticks, so a cancelled bake has touched nothing, and one undo step takes a finished one back.
 """
 
-import json
 import traceback
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import ClassVar
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..core.lint import findings
-from ..core.plan import plan, price_of_accuracy
 from ..core.progress import Cancelled, Progress
 from ..core.result import BakeResult
 from ..core.scene import SceneError
-from . import attribute_writer, bake_scene, checklist, copies, light_materials, panels, scene_reader, viewport, wording
+from . import (
+    attribute_writer,
+    bake_scene,
+    checklist,
+    copies,
+    light_materials,
+    panels,
+    planning,
+    scene_reader,
+    viewport,
+    wording,
+)
 from .job import BakeJob
 from .window_bake import WindowBake
 
@@ -120,7 +127,7 @@ class OBJECT_OT_radiosity_plan(bpy.types.Operator):
         return _can_bake(cls, context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        return _attempt(self, lambda: _plan(context))
+        return _attempt(self, lambda: planning.make(context))
 
 
 class OBJECT_OT_radiosity_switch_effect(bpy.types.Operator):
@@ -134,32 +141,7 @@ class OBJECT_OT_radiosity_switch_effect(bpy.types.Operator):
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         context.scene.radiosity_baker.switch_effect(self.effect, self.active)
-        return _attempt(self, lambda: _plan(context))
-
-
-def _plan(context: bpy.types.Context) -> None:
-    """Look at the scene and keep what there is to say of it in the settings, where drawing it costs nothing."""
-    asked = context.scene.radiosity_baker
-    settings, mode = asked.to_core(), asked.result_mode()
-    receivers = scene_reader.pick_receivers(context.scene, context.view_layer, None)
-    depsgraph = context.evaluated_depsgraph_get()
-    problems = checklist.of_objects(receivers, mode, depsgraph)
-    told: dict[str, object] = {}
-    try:
-        # What refuses the asked result is named already, and not to hide the rest.
-        scene, _ = scene_reader.read_scene(depsgraph, receivers, tessellate=settings.tessellate or bool(problems))
-    except scene_reader.NoLightError:
-        problems.append(checklist.no_light())
-    else:
-        planned = plan(scene, settings)
-        problems += checklist.of_findings(findings(scene, kept=mode == "keep")) + checklist.of_plan(planned)
-        told = {
-            "seconds": planned.seconds,
-            "memory_mb": planned.memory_mb,
-            "effects": [asdict(effect) for effect in planned.effects],
-            "costs": [[error, priced.seconds] for error, priced in price_of_accuracy(scene, settings).items()],
-        }
-    asked.plan = json.dumps(told | {"problems": [asdict(problem) for problem in problems]})
+        return _attempt(self, lambda: planning.make(context))
 
 
 class OBJECT_OT_radiosity_fix(bpy.types.Operator):
@@ -179,7 +161,7 @@ class OBJECT_OT_radiosity_fix(bpy.types.Operator):
         if not 0 <= self.number < len(problems):
             return {"CANCELLED"}
         checklist.fix(context, problems[self.number])
-        return _attempt(self, lambda: _plan(context))
+        return _attempt(self, lambda: planning.make(context))
 
 
 class OBJECT_OT_radiosity_accuracy(bpy.types.Operator):

@@ -14,13 +14,9 @@ from . import light_materials, presets, viewport
 from .checklist import FIXES
 from .copies import original_of
 from .job import BakeJob
+from .places import PLACES, redraw_panel
+from .planning import Following
 from .wording import count, energy_line, error_causes, percent, stage, time_line
-
-#: Where the panel appears, and what Blender wants to know about each place.
-PLACES = {
-    "RENDER": {"bl_space_type": "PROPERTIES", "bl_region_type": "WINDOW", "bl_context": "render"},
-    "VIEW3D": {"bl_space_type": "VIEW_3D", "bl_region_type": "UI", "bl_category": "Radiosity"},
-}
 
 #: Of the default interface font at scale 1, on average; and what a panel leaves free at its sides, with an icon.
 PIXELS_PER_LETTER = 6.0
@@ -137,6 +133,8 @@ class PlanSection:
         settings, layout = context.scene.radiosity_baker, self.layout
         plan = settings.last_plan()
         layout.operator("object.radiosity_plan", icon="VIEWZOOM")
+        if settings.plan and Following.behind:
+            _label(layout.column(align=True), context, tr("The scene has changed since"), icon="FILE_REFRESH")
         for number, problem in enumerate(settings.problems()):
             column = layout.box().column(align=True)
             _label(column, context, problem.text, icon="ERROR")
@@ -188,19 +186,10 @@ class AdvancedSection:
 
 
 def redraw(context: bpy.types.Context) -> None:
-    """Draw the panel and the status bar anew, where they are on show, and nothing that costs more."""
+    """Draw the panel and the status bar anew."""
+    redraw_panel(context)
     for window in context.window_manager.windows:
-        for area in window.screen.areas:
-            for region in area.regions:
-                if _shows_panel(area, region):
-                    region.tag_redraw()
         window.workspace.status_text_set(_draw_status if BakeJob.running is not None else None)
-
-
-def _shows_panel(area: bpy.types.Area, region: bpy.types.Region) -> bool:
-    if (area.type, region.type) == ("VIEW_3D", "UI"):
-        return region.active_panel_category == PLACES["VIEW3D"]["bl_category"]
-    return (area.type, region.type) == ("PROPERTIES", "WINDOW") and area.spaces.active.context == "RENDER"
 
 
 def _what_is_baked(context: bpy.types.Context) -> str:

@@ -13,6 +13,7 @@ from ..core import settings as core
 from . import light_materials, viewport
 from .checklist import Problem
 from .colour_storage import Storage
+from .planning import settings_changed
 
 LAYER_ITEMS = [
     ("combined", "Combined", "Emitted plus reflected light: what the surface looks like"),
@@ -68,20 +69,6 @@ def _show_layer(settings: "RadiosityBakerSettings", _context: bpy.types.Context)
         light_materials.follow_layer(light_materials.last_baked(settings.id_data))
 
 
-def _plan_again(settings: "RadiosityBakerSettings", _context: bpy.types.Context) -> None:
-    """A plan that is on show follows the settings, once they have come to rest."""
-    if not settings.plan:
-        return
-    if bpy.app.timers.is_registered(_replan):
-        bpy.app.timers.unregister(_replan)
-    bpy.app.timers.register(_replan, first_interval=0.3)
-
-
-def _replan() -> None:
-    if bpy.ops.object.radiosity_plan.poll():
-        bpy.ops.object.radiosity_plan("EXEC_DEFAULT", False)
-
-
 class RadiosityBakerSettings(bpy.types.PropertyGroup):
     """`scene.radiosity_baker`: the settings of the next bake and the report of the last."""
 
@@ -90,7 +77,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         description="What ends the bake: an accuracy that is reached, or a time that is up",
         items=GOAL_ITEMS,
         default="ERROR",
-        update=_plan_again,
+        update=settings_changed,
     )
     error: FloatProperty(
         name="Error",
@@ -102,7 +89,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         max=100.0,
         soft_max=20.0,
         precision=1,
-        update=_plan_again,
+        update=settings_changed,
     )
     seconds: FloatProperty(
         name="Time",
@@ -115,21 +102,21 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         soft_max=600.0,
         step=100,
         precision=1,
-        update=_plan_again,
+        update=settings_changed,
     )
     result: EnumProperty(
         name="Result",
         description="Where the baked light goes",
         items=RESULT_ITEMS,
         default="NEW",
-        update=_plan_again,
+        update=settings_changed,
     )
     density: EnumProperty(
         name="Tessellation",
         description="How finely the objects are split, so that their vertices can hold shadows",
         items=DENSITY_ITEMS,
         default="TRIANGLES",
-        update=_plan_again,
+        update=settings_changed,
     )
     triangles: IntProperty(
         name="Count",
@@ -139,7 +126,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         soft_max=500_000,
         max=20_000_000,
         step=1000,
-        update=_plan_again,
+        update=settings_changed,
     )
     size: FloatProperty(
         name="Length",
@@ -150,14 +137,14 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         min=0.0001,
         soft_min=0.005,
         soft_max=10.0,
-        update=_plan_again,
+        update=settings_changed,
     )
     estimator: EnumProperty(
         name="Form Factors",
         description="How the exchange of light between the patches is computed",
         items=ESTIMATOR_ITEMS,
         default="auto",
-        update=_plan_again,
+        update=settings_changed,
     )
     seed: IntProperty(
         name="Seed",
@@ -314,21 +301,25 @@ class RadiosityBakerObjectSettings(bpy.types.PropertyGroup):
         name="Receives",
         description="Bake light onto this object, when it is among those to bake",
         default=True,
+        update=settings_changed,
     )
     casts: BoolProperty(
         name="Casts",
         description="Let this object stand in the way of light, and cast shadows",
         default=True,
+        update=settings_changed,
     )
     bounces: BoolProperty(
         name="Bounces",
         description="Let this object reflect light onto others, and give off its own",
         default=True,
+        update=settings_changed,
     )
     use_size: BoolProperty(
         name="Own Tessellation",
         description="Split this object to a size of its own",
         default=False,
+        update=settings_changed,
     )
     size: FloatProperty(
         name="Longest Edge",
@@ -339,6 +330,7 @@ class RadiosityBakerObjectSettings(bpy.types.PropertyGroup):
         min=0.0001,
         soft_min=0.005,
         soft_max=10.0,
+        update=settings_changed,
     )
 
 
@@ -350,8 +342,6 @@ def register() -> None:
 
 
 def unregister() -> None:
-    if bpy.app.timers.is_registered(_replan):
-        bpy.app.timers.unregister(_replan)
     del bpy.types.Object.radiosity_baker
     del bpy.types.Scene.radiosity_baker
     bpy.utils.unregister_class(RadiosityBakerObjectSettings)

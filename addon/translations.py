@@ -15,6 +15,7 @@ GERMAN = {
     "Bake Again": "Erneut backen",
     "Clear": "Löschen",
     "Nothing stands in the way": "Nichts steht im Weg",
+    "The scene has changed since": "Die Szene hat sich seitdem geändert",
     "Bake Radiosity": "Radiosity backen",
     "Cancel Bake": "Backen abbrechen",
     "Stop and Keep": "Anhalten und behalten",

@@ -10,6 +10,7 @@ from .baked import Baked
 from .bending import Bends
 from .check import check_cost, check_scene
 from .clock import Clock
+from .cost import calibrate
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
 from .direct.lamps import place
@@ -69,7 +70,7 @@ def bake(
             lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
-            planned = price(chosen, settings, pilot, fixed=effort is not None)
+            planned = price(chosen, settings, calibrate(pilot, settings.threads), fixed=effort is not None)
             del pilot  # it holds a copy of the scene
             check_cost(planned)
             effort = planned.effort

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .cost import Work, calibrate
+from .cost import Machine, Work, calibrate
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
 from .effects import (
@@ -110,7 +110,8 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     effort: to work just so hard, instead of as hard as the settings call for.
     """
     pilot = Pilot(scene)
-    return price(choose(scene, settings, pilot, effort), settings, pilot, fixed=effort is not None)
+    chosen = choose(scene, settings, pilot, effort)
+    return price(chosen, settings, calibrate(pilot, settings.threads), fixed=effort is not None)
 
 
 def choose(scene: Scene, settings: Settings, pilot: Pilot, effort: Effort | None = None) -> Plan:
@@ -120,10 +121,10 @@ def choose(scene: Scene, settings: Settings, pilot: Pilot, effort: Effort | None
     return Plan(scene, effects, effort or choose_effort(scene, settings), 0, {}, 0.0, 0.0)
 
 
-def price(chosen: Plan, settings: Settings, pilot: Pilot, *, fixed: bool = False) -> Plan:
+def price(chosen: Plan, settings: Settings, machine: Machine, *, fixed: bool = False) -> Plan:
     """The chosen plan with its price, and thriftier where there is too little time for it, unless its effort is
     fixed."""
-    prices, effort = _Prices(chosen, settings, pilot), chosen.effort
+    prices, effort = _Prices(chosen, settings, machine), chosen.effort
     planned = prices.of(effort)
     if fixed or settings.seconds is None or planned.seconds <= settings.seconds:
         return planned
@@ -154,13 +155,16 @@ def thriftier(effort: Effort, steps: int) -> Effort:
     )
 
 
-def price_of_accuracy(scene: Scene, settings: Settings, errors: tuple[float, ...] = PRICED_ERRORS) -> dict[float, Plan]:
-    """What each error would cost on this scene: one calibration for all, then next to no time."""
-    asked = {error: replace(settings, error=error, seconds=None) for error in errors}
+def plan_with_prices(
+    scene: Scene, settings: Settings, errors: tuple[float, ...] = PRICED_ERRORS
+) -> tuple[Plan, dict[float, Plan]]:
+    """The plan, and what each of these errors would cost instead: one look at scene and machine for all."""
     pilot = Pilot(scene)
-    chosen = choose(scene, asked[errors[0]], pilot)
-    prices = _Prices(chosen, asked[errors[0]], pilot)
-    return {error: prices.of(choose_effort(chosen.scene, wish)) for error, wish in asked.items()}
+    chosen, machine = choose(scene, settings, pilot), calibrate(pilot, settings.threads)
+    asked = {error: replace(settings, error=error, seconds=None) for error in errors}
+    prices = _Prices(chosen, asked[errors[0]], machine)
+    costs = {error: prices.of(choose_effort(chosen.scene, wish)) for error, wish in asked.items()}
+    return price(chosen, settings, machine), costs
 
 
 def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene, bool]:
@@ -181,13 +185,13 @@ def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene
 
 
 class _Prices:
-    """Plans of one scene by effort; the machine is measured once."""
+    """Plans of one scene by effort."""
 
-    def __init__(self, chosen: Plan, settings: Settings, pilot: Pilot) -> None:
+    def __init__(self, chosen: Plan, settings: Settings, machine: Machine) -> None:
         scene = chosen.scene
         self._unpriced = chosen
         self._settings = settings
-        self._machine = calibrate(pilot, settings.threads)
+        self._machine = machine
         self._pieces = len(emitting_pieces(scene))
         self._own = sum(len(o.triangles) for o in scene.objects)
         self._cells: dict[int, int] = {}

@@ -11,7 +11,7 @@ from radiosity_baker.core.bake import bake
 from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, gather_rays, plan, price_of_accuracy
+from radiosity_baker.core.plan import LOOKING, gather_rays, plan, plan_with_prices
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
@@ -172,8 +172,9 @@ def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, m
     monkeypatch.setattr(
         "radiosity_baker.core.plan.calibrate", lambda *_: calls.append(1) or Machine(3e-7, 1e-8, 1.0, 1)
     )
-    prices = price_of_accuracy(build.furnished_room(), Settings(error=None, seconds=5.0))
+    planned, prices = plan_with_prices(build.furnished_room(), Settings(error=None, seconds=5.0))
     assert len(calls) == 1
+    assert planned.seconds <= 5.0
     seconds = [prices[error].seconds for error in sorted(prices, reverse=True)]
     assert seconds == sorted(seconds)
     assert seconds[-1] > 2 * seconds[0]
