@@ -5,7 +5,8 @@ wants one class for every panel of every editor.
 """
 
 import textwrap
-from typing import ClassVar
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
 import bpy
 from bpy.app.translations import pgettext_iface as tr
@@ -32,7 +33,7 @@ class BakeSection:
             button = layout.column()
             button.scale_y = 1.5
             button.operator("object.radiosity_bake", icon="LIGHT_SUN")
-            layout.label(text=_what_is_baked(context), icon="INFO")
+            _label(layout.column(align=True), context, _what_is_baked(context), icon="INFO")
         else:
             _draw_progress(layout, BakeJob.running)
 
@@ -97,9 +98,9 @@ class LastBakeSection:
             layout.operator("view3d.radiosity_restore", icon="LOOP_BACK")
         else:
             layout.operator("view3d.radiosity_show", icon="HIDE_OFF")
-        row = layout.row(align=True)
-        row.operator("object.radiosity_show_light", icon="MATERIAL")
-        row.operator("object.radiosity_show_lit")
+        column = layout.column(align=True)
+        column.operator("object.radiosity_show_light", icon="MATERIAL")
+        column.operator("object.radiosity_show_lit", icon="SHADING_TEXTURE")
         if light_materials.shows_light(light_materials.last_baked(context.scene)):
             layout.operator("object.radiosity_put_back", icon="LOOP_BACK")
         layers = viewport.baked_layers(context.scene, report)
@@ -146,23 +147,12 @@ class PlanSection:
             _figure(column, "Time", tr("About {amount}").format(amount=f"{plan['seconds']:.1f} s"))
             _figure(column, "Memory", tr("About {amount}").format(amount=f"{plan['memory_mb']:,.0f} MB"))
         if plan.get("costs"):
-            grid = layout.grid_flow(columns=2, even_columns=True, align=True)
+            grid = layout.grid_flow(row_major=True, columns=2, even_columns=True, align=True)
             for error, seconds in plan["costs"]:
                 text = f"{100 * error:g} %: {seconds:.0f} s"
                 grid.operator("object.radiosity_accuracy", text=text).percent = 100 * error
-        for effect in plan.get("effects", ()):
-            column = layout.column(align=True)
-            column.active = effect["active"]
-            row = column.row()
-            row.alignment = "LEFT"
-            switch = row.operator(
-                "object.radiosity_switch_effect",
-                text=effect["name"].capitalize(),
-                icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT",
-                emboss=False,
-            )
-            switch.effect, switch.active = effect["name"], effect["active"]
-            _label(column, context, effect["reason"], icon="BLANK1")
+        if plan.get("effects"):
+            _draw_effects(layout, context, plan["effects"])
 
 
 class AdvancedSection:
@@ -194,9 +184,38 @@ def redraw(context: bpy.types.Context) -> None:
 
 def _what_is_baked(context: bpy.types.Context) -> str:
     selected = sum(candidate.type == "MESH" for candidate in context.selected_objects)
-    if selected == 0:
-        return tr("Bakes all mesh objects")
-    return tr("Bakes {objects}").format(objects=count("selected object", selected))
+    rendered = sum(obj.type == "MESH" and not obj.hide_render for obj in context.view_layer.objects)
+    if 0 < selected < rendered:
+        return tr("Bakes the selection: {some} of {all} meshes").format(some=selected, all=rendered)
+    return tr("Bakes all meshes")
+
+
+def _draw_effects(layout: bpy.types.UILayout, context: bpy.types.Context, effects: Sequence[dict[str, Any]]) -> None:
+    """Those that are simulated, and the others below, out of the way."""
+    for effect in effects:
+        if effect["active"]:
+            _draw_effect(layout, context, effect)
+    header, body = layout.panel("radiosity_other_effects", default_closed=True)
+    header.label(text="Not Simulated")
+    for effect in effects if body is not None else ():
+        if not effect["active"]:
+            _draw_effect(body, context, effect)
+
+
+def _draw_effect(layout: bpy.types.UILayout, context: bpy.types.Context, effect: dict[str, Any]) -> None:
+    """A switch, and the reason why it stands as it does."""
+    column = layout.column(align=True)
+    column.active = effect["active"]
+    row = column.row()
+    row.alignment = "LEFT"
+    switch = row.operator(
+        "object.radiosity_switch_effect",
+        text=effect["name"].capitalize(),
+        icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT",
+        emboss=False,
+    )
+    switch.effect, switch.active = effect["name"], effect["active"]
+    _label(column, context, effect["reason"], icon="BLANK1")
 
 
 def _draw_progress(layout: bpy.types.UILayout, job: BakeJob) -> None:

@@ -38,7 +38,7 @@ def words(root):
     found |= {name.capitalize() for name in presets.PRESETS} | {said for said, _ in presets.PRESETS.values()}
     found |= {button for button, _ in checklist.FIXES.values()} | set(checklist.SAID.values())
     # Words that are put together: nouns with their number, stages and causes of errors.
-    found |= {noun + s for noun in ("object", "selected object", "triangle") for s in ("", "s")}
+    found |= {noun + s for noun in ("object", "triangle") for s in ("", "s")}
     found |= {"Starting", "Plan", "Tessellate", "Transport", "Gather", "Fit", "Layers", "Sampling", "Resolution"}
     return found - {""}
 
