@@ -7,7 +7,7 @@ that are ways of computing rather than parts of the scene leave it as it is; the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, log
 from typing import Any, Literal
@@ -18,7 +18,22 @@ from .convexity import nothing_stands_between
 from .direct.sky import split_bright
 from .patches import triangle_geometry
 from .result import Effect
-from .scene import AreaLamp, Lamp, PointLamp, Scene, SceneError, SkyMap, SpotLamp, SunLamp, Surface
+from .scene import (
+    LAMP_COLOUR,
+    RGB,
+    AreaLamp,
+    Float32,
+    Float64,
+    Lamp,
+    PointLamp,
+    Scene,
+    SceneError,
+    SkyMap,
+    SpotLamp,
+    SunLamp,
+    Surface,
+    Texture,
+)
 from .settings import Settings
 from .sky import equal_texels
 from .textures import triangle_colours, triangle_emission, varying_albedo, varying_emission
@@ -143,6 +158,36 @@ def portals(scene: Scene, settings: Settings) -> Effect:
     ways = [_names(placed)] * bool(placed)
     ways += ["an opening that was found" if found == 1 else f"{found} openings that were found"] * bool(found)
     return Effect("portals", True, f"the sky shines through {' and '.join(ways)}")
+
+
+def colour(scene: Scene, _: Settings) -> Effect:
+    what = next(_coloured(scene), None)
+    if what is not None:
+        return Effect("colour", True, f"{what} is coloured")
+    if goes_on(scene):
+        return Effect("colour", True, "what lets light through or mirrors it is followed in three channels")
+    return Effect("colour", False, "one channel: all light and all surfaces are grey")
+
+
+def _coloured(scene: Scene) -> Iterator[str]:
+    """What is not grey, by name; what is found out quickly first."""
+    used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
+    surfaces = [surface for number, surface in enumerate(scene.surfaces) if number in used]
+    colours = ("albedo", "emission", "transparent", "transmission", "mirror", "glass")
+    yield from (lamp.name for lamp in scene.lamps if _has_colour(np.array(getattr(lamp, LAMP_COLOUR[type(lamp)]))))
+    yield from (s.name for s in surfaces if _has_colour(np.array([getattr(s, name) for name in colours])))
+    if _has_colour(scene.sky.pixels if isinstance(scene.sky, SkyMap) else np.array(scene.sky)):
+        yield "the sky"
+    for surface in surfaces:
+        textures = surface.albedo_texture, surface.emission_texture
+        if any(texture is not None and _has_colour(texture.pixels) for texture in textures):
+            yield surface.name
+    yield from (o.name for o in scene.objects if o.colors is not None and _has_colour(o.colors))
+
+
+def _has_colour(values: Float32 | Float64) -> bool:
+    """Whether some row of values (..., 3) differs by more than rounding from channel to channel."""
+    return bool((np.ptp(values, axis=-1) > 1e-5 * values.max(axis=-1)).any())
 
 
 def bounces(scene: Scene, settings: Settings) -> Effect:
@@ -376,6 +421,49 @@ def _with_even_sky(scene: Scene) -> Scene:
     return replace(scene, sky=(red, green, blue))
 
 
+def _in_grey(scene: Scene) -> Scene:
+    """Everything in the mean of its channels."""
+
+    def grey(values: RGB) -> RGB:
+        mean = sum(values) / 3.0
+        return (mean, mean, mean)
+
+    def grey_pixels(texture: Texture | None) -> Texture | None:
+        return texture and replace(texture, pixels=_mean_channels(texture.pixels))
+
+    def grey_surface(s: Surface) -> Surface:
+        return replace(
+            s,
+            albedo=grey(s.albedo),
+            emission=grey(s.emission),
+            transparent=grey(s.transparent),
+            transmission=grey(s.transmission),
+            mirror=grey(s.mirror),
+            glass=grey(s.glass),
+            albedo_texture=grey_pixels(s.albedo_texture),
+            emission_texture=grey_pixels(s.emission_texture),
+        )
+
+    def grey_lamp(lamp: Lamp) -> Lamp:
+        name = LAMP_COLOUR[type(lamp)]
+        change: dict[str, Any] = {name: grey(getattr(lamp, name))}
+        return replace(lamp, **change)
+
+    sky = SkyMap(_mean_channels(scene.sky.pixels)) if isinstance(scene.sky, SkyMap) else grey(scene.sky)
+    objects = (o if o.colors is None else replace(o, colors=_mean_channels(o.colors)) for o in scene.objects)
+    return replace(
+        scene,
+        surfaces=tuple(map(grey_surface, scene.surfaces)),
+        lamps=tuple(map(grey_lamp, scene.lamps)),
+        sky=sky,
+        objects=tuple(objects),
+    )
+
+
+def _mean_channels(values: Float32) -> Float32:
+    return np.repeat(values.mean(axis=-1, keepdims=True), 3, axis=-1)
+
+
 def _unchanged(scene: Scene) -> Scene:
     return scene
 
@@ -398,6 +486,7 @@ EFFECTS: dict[str, Rule] = {
     "mirrors": Rule(mirrors, _without_share("mirror")),
     "clear glass": Rule(clear_glass, _without_share("glass")),
     "bounces": Rule(bounces, _unchanged),
+    "colour": Rule(colour, _in_grey),
     "albedo textures": Rule(albedo_textures, _with_even("albedo")),
     "textured emission": Rule(textured_emission, _with_even("emission")),
 }

@@ -22,14 +22,12 @@ from .parallel import Workers
 from .receivers import cell_colours
 from .refinement import Light, fit_alone, mean_reflected, refine
 from .result import BakeResult
-from .scene import AreaLamp, Float64, Lamp, PointLamp, Scene, SpotLamp, SunLamp
+from .scene import LAMP_COLOUR, Float64, Lamp, Scene
 from .settings import Settings
 from .sky import Sky
 from .survey import Survey, look_up
 from .transport import HALVES, fill_with_light
 
-#: What tells how bright a lamp is.
-_COLOR = {PointLamp: "intensity", SpotLamp: "intensity", SunLamp: "irradiance", AreaLamp: "radiance"}
 #: A lamp that becomes so many times as bright would want triangles and samples of its own.
 _MOST_GROWTH = 4.0
 
@@ -138,12 +136,12 @@ def _sampling_would_help(error: ErrorEstimate) -> bool:
 
 
 def _color(lamp: Lamp) -> Float64:
-    return np.array(getattr(lamp, _COLOR[type(lamp)]))
+    return np.array(getattr(lamp, LAMP_COLOUR[type(lamp)]))
 
 
 def _unit(lamp: Lamp) -> Lamp:
     """The same lamp in plain white, of one unit."""
-    bright: dict[str, Any] = {_COLOR[type(lamp)]: (1.0, 1.0, 1.0)}
+    bright: dict[str, Any] = {LAMP_COLOUR[type(lamp)]: (1.0, 1.0, 1.0)}
     return replace(lamp, **bright)
 
 

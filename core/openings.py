@@ -27,6 +27,8 @@ _FEWEST, _LEAST_SHARE = 16, 0.03
 _TRIANGLES, _PLANES = 4096, 40
 #: How far triangles may be off a common plane: in the cosine of their normals and in the unit box.
 _FLAT = 2e-3
+#: Openings lie in the unit box, or nearly so.
+_WITHIN = 1.05
 #: Share of the rays aimed at an opening that must escape; rays that tell; openings at most.
 _FREE, _TRIALS, _MOST = 0.4, 512, 8
 #: Share of the rays which must have left by the openings for the rest to be left to chance.
@@ -127,8 +129,9 @@ def _candidates(
     for plane in planes:
         ray, place = plane.crossings(escapes)
         for part in _close_together(place, least):
-            low, high = _to_edges(plane, place[part], patches)
-            yield ray[part], plane.rectangle(low, high)
+            rectangle = plane.rectangle(*_to_edges(plane, place[part], patches))
+            if np.abs(rectangle.corners).max() <= _WITHIN:
+                yield ray[part], rectangle
 
 
 def _close_together(place: Float64, least: int) -> Iterator[Int64]:

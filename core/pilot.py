@@ -91,12 +91,13 @@ class Escapes:
     """How rays from the receivers found the sky.
 
     origins, directions (n, 3) float32 in the unit box, of those that left straight from points that see little of it;
-    openness: the share of the rays from such points that did. none: no ray did from anywhere, straight or not; then up
-    to a share `doubt` of all rays may all the same.
+    inside: the share of such points; openness: the share of the rays from them that did. none: no ray did from
+    anywhere, straight or not; then up to a share `doubt` of all rays may all the same.
     """
 
     origins: Float32
     directions: Float32
+    inside: float
     openness: float
     none: bool
     doubt: float
@@ -111,21 +112,22 @@ class Escapes:
 def look_for_sky(pilot: Pilot) -> Escapes:
     """Rays from the receivers until enough have left, or it is clear that hardly any do."""
     found: list[Look] = []
-    inside, escaped, within = 0, False, 0
+    left, escaped, within = 0, False, 0
     for number in range(_ROUNDS):
         rng = stream(0, "look for sky", number)
         look = pilot.look_around(*pilot.on_receivers(_POINTS, rng), _RAYS, rng)
         narrow = np.repeat(look.escaped.reshape(-1, _RAYS).mean(axis=1) <= _NARROW, _RAYS)
         kept = look.escaped & narrow & look.straight
         found.append(Look(look.origins[kept], look.directions[kept], look.path))
-        inside += int(kept.sum())
+        left += int(kept.sum())
         within += int(narrow.sum())
         escaped |= bool(look.escaped.any())
-        if inside >= _ENOUGH or (escaped and not inside):
+        if left >= _ENOUGH or (escaped and not left):
             break
     origins, directions = (np.concatenate([getattr(f, name) for f in found]) for name in ("origins", "directions"))
     none = not escaped and not _wanders_out(pilot)
-    return Escapes(origins, directions, inside / max(within, 1), none, _SURE / (len(found) * _POINTS * _RAYS))
+    cast = len(found) * _POINTS * _RAYS
+    return Escapes(origins, directions, within / cast, left / max(within, 1), none, _SURE / cast)
 
 
 def _wanders_out(pilot: Pilot) -> bool:

@@ -12,6 +12,7 @@ from .direct.illumination import MOST_ASKED
 from .effects import (
     LAMPS,
     choose_effects,
+    colour,
     emitters_by_rays,
     goes_on,
     mean_of_sky,
@@ -45,8 +46,9 @@ _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6
-#: Noise of what the rays of one point say of the sky, relative to all light, above which openings are looked for.
-_SHOWS = 0.1
+#: Openings are looked for where so large a part of the receivers sees little of the sky, and the rays of one point
+#: there tell of it with so much noise, relative to all light.
+_INSIDE, _SHOWS = 0.1, 0.1
 #: What finding where light bends takes for each cell in the end: rays, and fits.
 _BEND_RAYS, _BEND_FITS = 100, 2
 #: Each step of thrift leaves this share of the work.
@@ -62,7 +64,7 @@ class Effort:
     transport_rays: of a patch side; shadow_rays: to a lamp with size; gather_rays: of a sample point; passes over all
     cells before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
     uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
-    triangles are too many to be lamps.
+    triangles are too many to be lamps; channels: 3, or 1 where everything is grey.
     """
 
     error: float
@@ -79,6 +81,7 @@ class Effort:
     tolerance: float
     threshold: float
     emitters_by_rays: bool
+    channels: int
 
 
 @dataclass(frozen=True)
@@ -168,9 +171,9 @@ def plan_with_prices(
 
 
 def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene, bool]:
-    """The scene with portals where the sky shines into rooms, if rays would find it with noise that shows; and whether
-    it is to be seen at all. A sky that could bring more than a tenth of the asked error by ways that are too narrow for
-    the rays counts as seen."""
+    """The scene with portals where the sky shines into rooms, if some of the receivers are inside and rays would find
+    it with noise that shows; and whether it is to be seen at all. A sky that could bring more than a tenth of the asked
+    error by ways that are too narrow for the rays counts as seen."""
     if not settings.effects.get("sky", True) or not sky(scene, settings).active:
         return scene, True
     found = look_for_sky(pilot)
@@ -179,7 +182,8 @@ def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene
     if found.none:
         return scene, unseen * found.doubt > error / 10.0 * others or sky_lights(scene, settings).active
     noise = unseen * np.sqrt(found.openness / gather_rays(error))
-    if not settings.effects.get("portals", True) or noise <= _SHOWS * (unseen * found.openness + others):
+    shows = found.inside >= _INSIDE and noise > _SHOWS * (unseen * found.openness + others)
+    if not shows or not settings.effects.get("portals", True):
         return scene, True
     return replace(scene, portals=(*scene.portals, *find_openings(found, pilot))), True
 
@@ -279,6 +283,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         tolerance=min(asked / 20, 1e-3),
         threshold=1e-5,
         emitters_by_rays=emitters_by_rays(scene),
+        channels=3 if settings.effects.get("colour") or colour(scene, settings).active else 1,
     )
 
 

@@ -19,6 +19,7 @@ from .scene import Bool, Float64, Scene
 from .settings import Settings
 from .survey import Survey
 from .textures import Colours
+from .transport import in_three_channels
 
 #: Squared sampling error, relative to that of the rest, which no longer shows beside it.
 _HIDDEN = 0.25
@@ -194,16 +195,18 @@ def _light(
     dark = np.zeros((survey.receivers.vertices, 3))
     reflected, sky, emitted = dark, dark, dark
     if around:
-        reflected = values[1][:, :3]
+        reflected = in_three_channels(values[1][:, around.reflected])
         sky = values[1][:, around.sky] @ around.hemispheres.sky.irradiance
-        emitted = values[1][:, around.emitted] if around.emitted.stop > around.emitted.start else dark
+        by_rays = around.emitted.stop > around.emitted.start
+        emitted = in_three_channels(values[1][:, around.emitted]) if by_rays else dark
+    lamps, of_sky = np.split(values[0], [values[0].shape[1] // (2 if survey.tells_sky_apart else 1)], axis=1)
     if survey.tells_sky_apart:
-        sky = sky + values[0][:, 3:]
+        sky = sky + in_three_channels(of_sky)
     return Light(
         reflected=reflected,
         sky=sky,
         emitted=emitted,
-        lamps=values[0][:, :3],
+        lamps=in_three_channels(lamps),
         alphas=alphas,
         error=error,
         cell_error=cell_error,

@@ -227,6 +227,14 @@ class SkyMap:
 
 Lamp = PointLamp | SpotLamp | SunLamp | AreaLamp
 
+#: What tells how bright a lamp is, and of which colour, by its kind.
+LAMP_COLOUR: dict[type, str] = {
+    PointLamp: "intensity",
+    SpotLamp: "intensity",
+    SunLamp: "irradiance",
+    AreaLamp: "radiance",
+}
+
 
 @dataclass(frozen=True)
 class Portal:

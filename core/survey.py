@@ -39,14 +39,15 @@ _BESIDES = np.concatenate([0.98 * np.eye(3) + 0.02 / 3, 0.49 * (1.0 - np.eye(3))
 class Surroundings:
     """What rays from the receivers can bring.
 
-    tables: for each half of the transport (codes, columns) radiosity by ray code. The columns are reflected light (3);
-    if the scene calls for it the sky (as many as Sky.light) and emitting surfaces that are not sampled as lamps (3);
-    and last the mean of the reflected light again, from coarser patches. to_grey (columns - 1,): weights that turn the
-    columns into the mean irradiance of the three channels.
+    tables: for each half of the transport (codes, columns) radiosity by ray code. The columns are reflected light, in
+    one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
+    first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
+    patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
     """
 
     hemispheres: Hemispheres
     tables: tuple[Float32, ...]
+    reflected: slice
     sky: slice
     emitted: slice
     to_grey: Float64
@@ -64,24 +65,28 @@ def look_up(
     if not halves:
         return None
     sky = sky.in_colour(patches.coloured)
-    seen = sky.light.shape[1]
-    by_rays = 3 * effort.emitters_by_rays
+    seen, channels = sky.light.shape[1], effort.channels
+    by_rays = channels * effort.emitters_by_rays
     return Surroundings(
         hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"), sky),
-        tables=tuple(_table(half, sky, effort.emitters_by_rays) for half in halves),
-        sky=slice(3, 3 + seen),
-        emitted=slice(3 + seen, 3 + seen + by_rays),
-        to_grey=np.concatenate([np.full(3, 1 / 3), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / 3)]),
+        tables=tuple(_table(half, sky, effort) for half in halves),
+        reflected=slice(0, channels),
+        sky=slice(channels, channels + seen),
+        emitted=slice(channels + seen, channels + seen + by_rays),
+        to_grey=np.concatenate(
+            [np.full(channels, 1 / channels), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / channels)]
+        ),
     )
 
 
-def _table(half: Transport, sky: Sky, emitters: bool) -> Float32:
-    emission = [np.pi * half.sides.emission] if emitters else []
+def _table(half: Transport, sky: Sky, effort: Effort) -> Float32:
+    emitters, channels = effort.emitters_by_rays, effort.channels
+    emission = [np.pi * half.sides.emission[:, :channels]] if emitters else []
     coarser = half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True))
     no_sky = np.zeros((len(coarser), sky.light.shape[1]))
-    met = half.by_code(np.concatenate([half.reflected, no_sky, *emission, coarser], axis=1))
+    met = half.by_code(np.concatenate([half.reflected[:, :channels], no_sky, *emission, coarser], axis=1))
     left = np.zeros((len(sky.light), met.shape[1]), dtype=np.float32)
-    left[:, 3 : 3 + no_sky.shape[1]] = sky.light
+    left[:, channels : channels + no_sky.shape[1]] = sky.light
     table = np.concatenate([met, left])
     if emitters or not half.mirrored_emission:
         return table
@@ -117,9 +122,9 @@ def dark(total: Float64, direct: Float64, mean: float) -> Bool:
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
-    indirect: a channel for each column of the surroundings but the last; direct: red, green, blue, and once more for
-    sky_light, if that is to be told from the rest. coarser: for each half (c,) the change that coarser patches make to
-    the mean irradiance, by one pass each: that is sure enough.
+    indirect: a channel for each column of the surroundings but the last; direct: red, green and blue, or grey, and once
+    more for sky_light, if that is to be told from the rest. coarser: for each half (c,) the change that coarser patches
+    make to the mean irradiance, by one pass each: that is sure enough.
     """
 
     def __init__(
@@ -137,7 +142,7 @@ class Survey:
         self.surroundings = surroundings
         to_grey = surroundings.to_grey if surroundings else np.zeros(0)
         self.indirect = [Samples(count, to_grey), Samples(count, to_grey)]
-        channels = np.full(6 if sky_light else 3, 1 / 3)
+        channels = np.full(effort.channels * (2 if sky_light else 1), 1 / effort.channels)
         self.direct = [Samples(count, channels), Samples(count, channels)]
         self.coarser = [np.zeros(count), np.zeros(count)]
         self.invalid = np.zeros(count, dtype=bool)
@@ -187,7 +192,7 @@ class Survey:
         self.rays += rays
         values = arriving[:, :columns]
         if number < 2:
-            self.coarser[half] = arriving[:, columns] - values[:, :3].mean(axis=1)
+            self.coarser[half] = arriving[:, columns] - values[:, around.reflected].mean(axis=1)
         direct = light.grey
         total = values @ around.to_grey + direct
         self._mean = float(total.mean())
@@ -272,4 +277,5 @@ class Survey:
     ) -> None:
         deviation = np.sqrt(light.variance).reshape(len(light.variance), -1, 3).mean(axis=2)
         noise = (deviation**2).sum(axis=1)
-        self.direct[half % 2].add(index, points.barycentric, light.irradiance, noise, valid)
+        values = light.irradiance[:, :: 3 // self._effort.channels]
+        self.direct[half % 2].add(index, points.barycentric, values, noise, valid)

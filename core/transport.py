@@ -103,6 +103,11 @@ class Transport:
         return {"emitted": emitted, "absorbed": absorbed, "escaped": escaped, "residual": residual}
 
 
+def in_three_channels(values: Float64) -> Float64:
+    """Values (n, 3), or the same (n, 1) in each of three channels."""
+    return values if values.shape[1] == 3 else np.repeat(values, 3, axis=1)
+
+
 def reflected(sides: Sides, irradiance: Float64) -> Float64:
     """Radiosity (s, 3) W/m^2 that irradiance (s, 3) on both sides of all patches brings forth."""
     if sides.patches.transmission is None:
@@ -170,7 +175,8 @@ def fill_with_light(
         incoming += _received(exchange, np.pi * sides.emission, workers)
     elif exchange.glints is not None:
         incoming += exchange.glints
-    solution = _solve(exchange, incoming, effort.tolerance, workers)
+    solution = _solve(exchange, incoming[:, : effort.channels], effort.tolerance, workers)
+    solution = replace(solution, irradiance=in_three_channels(solution.irradiance))
     return Transport(
         exchange, incoming, solution, exchange.rays + shadow_rays, mirrored_emission=exchange.glints is not None
     )
@@ -188,7 +194,7 @@ def _received(exchange: Exchange, radiosity: Float64, workers: Workers) -> Float
 
 def _solve(exchange: Exchange, incoming: Float64, tolerance: float, workers: Workers) -> Solution:
     sides, rows = exchange.sides, exchange.rows
-    albedo = sides.albedo.astype(np.float64)
+    albedo = sides.albedo[:, : incoming.shape[1]].astype(np.float64)
     if not exchange.reciprocal:
         return shoot_until(rows[0], albedo, incoming, tolerance, workers)
     if sides.patches.transmission is not None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...sample_blends.modelling import Point, Shape, add_mesh, area_lamp, box, diffuse, join, polygons, sphere
 from .catalogue import effect_scene
+from .skies import plain
 from .textures import unwrap
 
 WHITE = (1.0, 1.0, 1.0)
@@ -25,14 +26,6 @@ def stage() -> None:
     floor, wall, side = box((4.0, 4.0, 0.1), white), box((4.0, 0.1, 2.0), white), box((0.1, 4.0, 2.0), red)
     add_mesh("Stage", join([floor.moved(z=-0.1), wall.moved(y=2.05, z=-0.1), side.moved(x=-2.05, z=-0.1)]))
     area_lamp("Softbox", 150.0, WHITE, (0.2, -0.3, 2.4), (0.8, 0.8))
-
-
-def even_sky(radiance: float) -> None:
-    world = bpy.data.worlds.new("Sky")
-    bpy.context.scene.world = world
-    if world.node_tree is None:
-        world.use_nodes = True
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (radiance, radiance, radiance, 1.0)
 
 
 def made_of(name: str, kind: str, **values: object) -> bpy.types.Material:
@@ -75,6 +68,22 @@ def screen(material: bpy.types.Material, width: float = 1.6, height: float = 1.6
     return polygons(corners, [(0, 1, 2, 3)], material)
 
 
+def fence() -> bpy.types.Material:
+    """Bars of wood, painted on a picture whose alpha cuts away the rest."""
+    bars = np.ones((16, 16, 4), np.float32)
+    bars[..., 3] = 0.0
+    bars[:, 2:6, 3] = bars[:, 10:14, 3] = bars[3:6, :, 3] = 1.0
+    picture = bpy.data.images.new("Bars", 16, 16, alpha=True)
+    picture.pixels.foreach_set(bars.ravel())
+    wood = made_of("Wood", "ShaderNodeBsdfPrincipled", Base_Color=(0.4, 0.25, 0.1, 1.0))
+    tree = wood.node_tree
+    image = tree.nodes.new("ShaderNodeTexImage")
+    image.image, image.interpolation = picture, "Closest"
+    shader = tree.get_output_node("ALL").inputs["Surface"].links[0].from_node
+    tree.links.new(image.outputs["Alpha"], shader.inputs["Alpha"])
+    return wood
+
+
 def canopy(material: bpy.types.Material) -> Shape:
     """One level face at z = 1.2."""
     corners = np.array([(-0.8, -0.8, 1.2), (0.8, -0.8, 1.2), (0.8, 0.8, 1.2), (-0.8, 0.8, 1.2)])
@@ -90,7 +99,7 @@ def veil_that_covers_half() -> None:
 @effect_scene("transparency", receivers=STAGE)
 def coloured_films_over_each_other() -> None:
     stage()
-    even_sky(0.5)
+    plain((0.5, 0.5, 0.5))
     add_mesh("Blue", canopy(made_of("Blue", "ShaderNodeBsdfTransparent", Color=(0.2, 0.4, 0.9, 1.0))))
     film = mixed(
         "Yellow",
@@ -104,18 +113,7 @@ def coloured_films_over_each_other() -> None:
 @effect_scene("transparency", receivers=STAGE)
 def fence_of_a_picture_with_holes() -> None:
     stage()
-    bars = np.ones((16, 16, 4), np.float32)
-    bars[..., 3] = 0.0
-    bars[:, 2:6, 3] = bars[:, 10:14, 3] = bars[3:6, :, 3] = 1.0
-    picture = bpy.data.images.new("Bars", 16, 16, alpha=True)
-    picture.pixels.foreach_set(bars.ravel())
-    wood = made_of("Wood", "ShaderNodeBsdfPrincipled", Base_Color=(0.4, 0.25, 0.1, 1.0))
-    tree = wood.node_tree
-    image = tree.nodes.new("ShaderNodeTexImage")
-    image.image, image.interpolation = picture, "Closest"
-    shader = tree.get_output_node("ALL").inputs["Surface"].links[0].from_node
-    tree.links.new(image.outputs["Alpha"], shader.inputs["Alpha"])
-    unwrap(add_mesh("Fence", screen(wood), at=(0.0, 0.6, 0.0)))
+    unwrap(add_mesh("Fence", screen(fence()), at=(0.0, 0.6, 0.0)))
 
 
 @effect_scene("transparency", receivers=STAGE)
@@ -135,7 +133,7 @@ def curtain_before_the_light() -> None:
 @effect_scene("diffuse transmission", receivers=STAGE)
 def leaves_that_reflect_and_transmit() -> None:
     stage()
-    even_sky(0.5)
+    plain((0.5, 0.5, 0.5))
     leaf = mixed(
         "Leaf",
         0.5,
@@ -150,7 +148,7 @@ def leaves_that_reflect_and_transmit() -> None:
 @effect_scene("mirrors", receivers=STAGE)
 def mirror_under_the_sky() -> None:
     stage()
-    even_sky(1.0)
+    plain(WHITE)
     bpy.data.objects.remove(bpy.data.objects["Softbox"])
     add_mesh(
         "Mirror", screen(made_of("Silver", "ShaderNodeBsdfAnisotropic", Color=(0.9, 0.9, 0.9, 1.0), Roughness=0.0))
@@ -160,7 +158,7 @@ def mirror_under_the_sky() -> None:
 @effect_scene("mirrors", receivers=STAGE)
 def ball_of_rough_gold_under_the_sky() -> None:
     stage()
-    even_sky(1.0)
+    plain(WHITE)
     bpy.data.objects.remove(bpy.data.objects["Softbox"])
     gold = made_of("Gold", "ShaderNodeBsdfPrincipled", Base_Color=(0.9, 0.6, 0.2, 1.0), Metallic=1.0, Roughness=0.4)
     add_mesh("Ball", sphere(0.5, gold), at=(-0.3, 0.4, 0.5))
@@ -169,7 +167,7 @@ def ball_of_rough_gold_under_the_sky() -> None:
 @effect_scene("clear glass", receivers=STAGE)
 def pane_of_glass_before_the_sky() -> None:
     stage()
-    even_sky(1.0)
+    plain(WHITE)
     bpy.data.objects.remove(bpy.data.objects["Softbox"])
     glass = made_of("Glass", "ShaderNodeBsdfGlass", Color=(0.8, 0.95, 0.9, 1.0), Roughness=0.0, IOR=1.45)
     add_mesh("Pane", box((1.6, 1.6, 0.02), glass), at=(0.2, 0.2, 0.8))

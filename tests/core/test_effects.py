@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from radiosity_baker.core import bake as pipeline
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.convexity import nothing_stands_between
 from radiosity_baker.core.effects import EFFECTS, choose_effects
@@ -24,6 +25,7 @@ from radiosity_baker.core.scene import (
     Texture,
 )
 from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.survey import Survey
 
 #: Looks down from below, so that it shines on nothing and no cell is split for it.
 PORTAL = Portal("window", (0, 0, -5), (0.3, 0, 0), (0, 0.3, 0), (0, 0, -1))
@@ -174,6 +176,57 @@ def test_lamps_that_cast_no_shadow_shine_through(build):
     through = light(Scene((floor, roof), (black,), (replace(lamp, casts_shadow=False),)))[..., 0]
     assert dark.max() < 0.01 * through.max()
     assert through.min() > 0
+
+
+def in_grey(scene: Scene) -> Scene:
+    return choose_effects(scene, Settings(effects={"colour": False}))[1]
+
+
+def test_without_colour_everything_is_the_mean_of_its_channels(everything):
+    """The light too, since it is linear in each colour; up to what two colours at once differ by from their means."""
+    effects, scene = choose_effects(everything, Settings(effects={"colour": False}))
+    colour, grey = light(everything), light(scene)
+    assert grey[..., 0] == pytest.approx(grey[..., 2], rel=1e-6)
+    assert next(e for e in effects if e.name == "colour").reason.startswith("switched off by hand")
+    assert grey.mean() == pytest.approx(colour.mean(), rel=0.25)
+
+
+def test_one_channel_where_everything_is_grey_gives_the_same_light_from_a_third_of_the_numbers(build, monkeypatch):
+    """To the last bit but for solvers that end a step earlier."""
+    scene = in_grey(build.furnished_room())
+    kept = []
+
+    def remembering(*given, **named):
+        made = Survey(*given, **named)
+        kept.append(made)
+        return made
+
+    monkeypatch.setattr(pipeline, "Survey", remembering)
+    one, three = (bake(scene, replace(QUICK, effects=asked)) for asked in ({}, {"colour": True}))
+    reasons = {effect.name: effect for effect in one.report.effects}
+    assert reasons["colour"].reason == "one channel: all light and all surfaces are grey"
+    first, second = kept
+    assert 3 * first.direct[0].light.nbytes == 3 * first.indirect[0].light.nbytes == second.direct[0].light.nbytes
+    assert first.rays == second.rays
+    for grey, same in zip(one.objects, three.objects, strict=True):
+        assert grey.layers["combined"] == pytest.approx(same.layers["combined"], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("change", "name"),
+    [
+        ({"sky": (0.1, 0.1, 0.2)}, "the sky"),
+        ({"lamps": (replace(LAMP, intensity=(1.0, 0.9, 1.0)),)}, "bulb"),
+        ({"surfaces": (Surface("paint", (0.5, 0.4, 0.5)),)}, "paint"),
+        ({"surfaces": (Surface("picture", albedo_texture=Texture(np.array([[[1, 0, 0]]], np.float32))),)}, "picture"),
+    ],
+)
+def test_anything_coloured_takes_three_channels_and_is_named(build, change, name):
+    floor = replace(build.quad("floor", (-1, -1, 0), (2, 0, 0), (0, 2, 0)), uv=np.zeros((2, 3, 2), np.float32))
+    grey = Scene((floor,), (build.grey,), (LAMP,))
+    colour = {e.name: e for e in choose_effects(replace(grey, **change), Settings())[0]}["colour"]
+    assert (colour.active, colour.reason) == (True, f"{name} is coloured")
+    assert not {e.name: e for e in choose_effects(grey, Settings())[0]}["colour"].active
 
 
 def test_forcing_an_effect_on_that_is_not_there_changes_nothing(build):
