@@ -59,9 +59,12 @@ class ErrorEstimate:
 UNKNOWN = ErrorEstimate(np.inf, np.inf, np.inf)
 
 #: How much the fit may weigh smoothness, from hardly to a lot.
-ALPHAS = (0.02, 0.5, 5.0)
+ALPHAS = (0.02, 0.5, 5.0, 50.0)
 #: Mean squared jump of the gradient over mean squared error, of the least smooth fit of a step and of a parabola.
 STEP_BEND, PARABOLA_BEND = 6.0, 70.0
+#: By what share of itself the samples' own noise may be misjudged: the two sets of rays that tell are not quite
+#: independent.
+_MISJUDGED = 0.01
 #: By how much the light changes with coarser patches, over its error with the patches there are. Triangles that lie
 #: four to a square become a square: the second moments that blur the light grow by three (A/9 of a right-angled
 #: triangle, A/3 of a square). The error falls with the length to the power of 1.5: with its square everywhere else, but
@@ -71,14 +74,19 @@ COARSENING = 3.0**0.75 - 1.0
 
 def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -> Fitted:
     """Fit with the alpha at which each half of the samples best predicts the other (cross-validation), judged by the
-    mean light. area (c,) of the cells; shown (c,): what a squared error of the light there counts."""
+    mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what a squared error of the light there
+    counts."""
+    merged = halves[0] + halves[1]
+    limits = fit.limits(merged)
+    low, high = (limit @ merged.to_grey for limit in limits)
     grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
     tried: list[_Halves] = []
     start: list[Float64 | None] = [None, None]
     for alpha in ALPHAS:
         values = [fit.solve(system, alpha, begin) for system, begin in zip(systems, start, strict=True)]
-        first, second = (fit.at_corners(v)[..., 0] for v in values)
+        # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
+        first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
         tried.append(_Halves(alpha, first, second, predicted))
         if len(tried) > 1 and area @ predicted > area @ tried[-2].predicted:
@@ -89,9 +97,8 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
         start = [*values]
     sharpest, best = tried[0], tried[-1]
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
-    unseen = _unresolved(bend, sharpest.predicted - own_noise - sharpest.spread / 2.0, area * shown)
-    merged = halves[0] + halves[1]
-    together = fit.solve_within(fit.system(merged), best.alpha, merged)
+    unseen = _unresolved(bend, sharpest.predicted - sharpest.spread / 2.0, own_noise, area * shown)
+    together = fit.solve_within(fit.system(merged), best.alpha, limits)
     return Fitted(
         best.alpha, together, together @ halves[0].to_grey, best.spread / 4.0, unseen + best.smoothed_by(sharpest)
     )
@@ -116,15 +123,17 @@ class _Halves:
         return (squared_mean(one + other) - squared_mean(one - other)) / 4.0
 
 
-def _unresolved(bend: Float64, left: Float64, weight: Float64) -> Float64:
-    """Squared error (c,) of the least smooth fit, from two witnesses: its own bends, and what is `left` of the samples'
-    squared distance from it without their noise.
+def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:
+    """Squared error (c,) of the least smooth fit, from two witnesses: its own bends, and what is left of the samples'
+    squared distance (c,) from it without their noise (c,).
 
     A bend is certain, but whether it means a step, a kink or a curve is not: then the error is a sixth to a seventieth
-    of it. What is left is right on average, but a small difference of large numbers. Each counts by its variance.
+    of it. What is left is right on average, but a small difference of large numbers, however many there are: the noise
+    is not known any better than _MISJUDGED. Each counts by its variance.
     """
     guess = max(float(weight @ bend), 0.0) / np.sqrt(STEP_BEND * PARABOLA_BEND)
-    doubt = float(np.sum((weight * left) ** 2))
+    left = distance - noise
+    doubt = float(np.sum((weight * left) ** 2)) + (_MISJUDGED * float(weight @ noise)) ** 2
     if guess <= 0.0:
         return np.zeros_like(bend)
     told = (doubt * guess + guess**2 * float(weight @ left)) / (doubt + guess**2)

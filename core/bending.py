@@ -63,7 +63,7 @@ class Bends:
         """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
         cells = survey.receivers.cells
         found = fit_samples(survey, scene, self._workers)
-        squared = cells.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
+        squared = found.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         # A split cell becomes four, and makes its neighbours become two or three.
         room = max((limit - len(cells)) // 5, 0)

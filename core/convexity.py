@@ -9,13 +9,15 @@ from .scene import AreaLamp, Float64, Lamp, PointLamp, Scene, SpotLamp, SunLamp
 
 #: Of the extent: what sticks out of a plane by less counts as within it.
 _FLAT = 1e-6
-#: Triangles looked at together, and how many products of planes and points are worth the answer.
-_CHUNK, _WORTH = 64, 20_000_000
+#: Triangles looked at together; how many of them, and products of planes and points, are worth the answer.
+_CHUNK, _MOST, _WORTH = 64, 20_000, 20_000_000
 
 
 def nothing_stands_between(scene: Scene) -> bool:
     """Whether the plane of every triangle has all surfaces and all lamps on one side of it, so that no way from a
     surface to a lamp can cross a triangle. False also where there are too many triangles to find out."""
+    if sum(len(o.triangles) for o in scene.objects) > _MOST:
+        return False
     corners = np.concatenate([o.vertices[o.triangles] for o in scene.objects])
     normals, area = triangle_geometry(corners)
     corners, normals = corners[area > 0], normals[area > 0]

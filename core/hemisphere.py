@@ -13,31 +13,32 @@ import numpy as np
 
 from .patches import Patches
 from .sampling import cosine_patterns, frames
-from .scene import Bool, Float32, Float64
+from .scene import Bool, Float32, Float64, Int32
 from .sky import DARK, Sky
 from .visibility import LOST, Visibility, offset_along
 
 #: Rays a chunk: few enough to stay in the processor's caches, enough that Python hardly counts.
 CHUNK_RAYS = 65536
-_PATTERNS = 256
+#: Rays of all patterns together, and how many there are at least.
+_PATTERN_RAYS, _FEWEST_PATTERNS = 16384, 256
 
 
 @dataclass(frozen=True)
 class Codes:
-    """What a ray met, as one integer: triangle index for a front, plus `triangles` for a back, or one of the others."""
+    """What a ray met, as one integer: patch index for a front, plus `patches` for a back, or one of the others."""
 
-    triangles: int
+    patches: int
 
     @property
     def lost(self) -> int:
         """A ray about a shading normal that starts below the surface itself: it carries nothing, as in Cycles. One that
         was absorbed on its way neither."""
-        return 2 * self.triangles
+        return 2 * self.patches
 
     @property
     def escaped(self) -> int:
         """The first of the codes of rays that left the scene, one for each texel of the sky."""
-        return 2 * self.triangles + 1
+        return 2 * self.patches + 1
 
 
 class Looks(NamedTuple):
@@ -61,10 +62,12 @@ class Hemispheres:
     def __init__(
         self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator, sky: Sky = DARK
     ) -> None:
-        self.codes = Codes(len(patches.normals))
+        self.codes = Codes(len(patches))
         self.sky = sky
         self._visibility = visibility
-        self._normals = patches.normals.astype(np.float32)
+        # Normal and patch of each triangle side by side: a ray needs both, from a place in memory far from the last.
+        self._met = np.column_stack([patches.normals, np.zeros(len(patches.normals))]).astype(np.float32)
+        self._met[:, 3] = patches.patch.view(np.float32)
         self._choose(rays, rng)
 
     def with_rays(self, rays: int, rng: np.random.Generator) -> Hemispheres:
@@ -81,21 +84,19 @@ class Hemispheres:
     def _choose(self, rays: int, rng: np.random.Generator) -> None:
         self.rays = rays
         self.chunk = max(1, CHUNK_RAYS // rays)
-        half = rays // 2
-        self._patterns = np.concatenate(
-            [cosine_patterns(_PATTERNS, half, rng), cosine_patterns(_PATTERNS, rays - half, rng)], axis=1
-        )
+        count = max(_PATTERN_RAYS // rays, _FEWEST_PATTERNS)
+        self._patterns = tuple(cosine_patterns(count, half, rng) for half in (rays // 2, rays - rays // 2))
 
     def cast(self, points: Float64, normals: Float64, shading: Float64, rng: np.random.Generator) -> Looks:
         """Looks around from points (n, 3) with geometric normals and shading normals (n, 3)."""
         count = len(points)
         turn = rng.random(count, dtype=np.float32) * np.float32(2 * np.pi)
-        pattern = self._patterns[rng.integers(_PATTERNS, size=count)]
+        # Each half draws its own: paired once and for all, the few pairs there are would be alike by chance.
+        pattern = np.concatenate([some[rng.integers(len(some), size=count)] for some in self._patterns], axis=1)
         directions = (pattern @ frames(shading.astype(np.float32), turn)).reshape(-1, 3)
         origins = np.repeat(offset_along(points, normals), self.rays, axis=0)
         path = self._visibility.follow(origins, directions, rng)
-        code = path.hit.copy()
-        code[self._from_behind(path.hit, path.directions)] += self.codes.triangles
+        code = self._sides(path.hit, path.directions)
         left = np.flatnonzero(path.hit < 0)
         texel = self.sky.texel(path.directions[left])
         if self.sky.portals:
@@ -119,7 +120,8 @@ class Hemispheres:
         ways = (reach[:, None] * normals).astype(np.float32)
         return ~self._visibility.unblocked_along(offset_along(points, normals), ways)
 
-    def _from_behind(self, hit: np.ndarray, directions: Float32) -> np.ndarray:
-        """Whether each ray met the back of a triangle; False for rays that met nothing."""
-        along = np.einsum("nk,nk->n", self._normals[hit], directions)
-        return (along > 0) & (hit >= 0)
+    def _sides(self, hit: Int32, directions: Float32) -> Int32:
+        """The code of the side of a patch that each ray has met; of no meaning for rays that met nothing."""
+        met = self._met[hit]
+        behind = np.einsum("nk,nk->n", met[:, :3], directions) > 0
+        return np.asarray(met.view(np.int32)[:, 3] + np.int32(self.codes.patches) * behind)

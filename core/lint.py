@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from .patches import row_numbers
 from .scene import ALBEDO_LIMIT, AreaLamp, Bool, Float64, Int32, PointLamp, Scene, SceneObject, SpotLamp
 
 Kind = Literal["mixed winding", "inside out", "duplicate faces", "zero area", "albedo", "coarse"]
@@ -77,8 +78,8 @@ def duplicates(corners: Float64) -> Bool:
     grid = np.rint(corners / (_SAME * _extent(corners))).astype(np.int64)
     order = np.lexsort((grid[..., 2], grid[..., 1], grid[..., 0]), axis=1)
     ordered = np.take_along_axis(grid, order[..., None], axis=1).reshape(len(grid), 9)
-    _, first, which = np.unique(ordered, axis=0, return_index=True, return_inverse=True)
-    return np.asarray(first[which.reshape(-1)] != np.arange(len(grid)))
+    _, first, which = np.unique(row_numbers(ordered), return_index=True, return_inverse=True)
+    return np.asarray(first[which] != np.arange(len(grid)))
 
 
 def is_inside_out(receiver: SceneObject, scene: Scene) -> bool:

@@ -39,6 +39,7 @@ def patches_by_light(
     patches = make_patches(scene, space, split)
     visibility = Visibility(patches.corners, patches.optics)
     light = DirectLight(lights, visibility, seed)
+    triangles = len(patches.area)
     fresh, fair = np.arange(len(patches)), 0.0
     for level in range(_LEVELS if lights else 0):
         mean, variation = _light_inside(patches, fresh, light, seed, level, workers)
@@ -51,7 +52,8 @@ def patches_by_light(
         split, changed = _refined(split, patches, uneven)
         patches = make_patches(scene, space, split)
         fresh = np.unique(patches.patch[changed[patches.triangle]])
-    return patches, Visibility(patches.corners, patches.optics)
+    # Patches of dense meshes get finer by fewer triangles each: the same triangles meet the rays.
+    return patches, visibility if len(patches.area) == triangles else Visibility(patches.corners, patches.optics)
 
 
 def _light_inside(

@@ -143,8 +143,7 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     small = solid[(entire & (area < _SMALL * edge * edge / 2))[solid]]
     cube = np.floor(corners.mean(axis=1) / (0.8 * edge)[:, None])
     alike = np.column_stack([number, surface, split.halvings, cube, np.rint(normals * 1.5)]).astype(np.int64)
-    patch = group_alike(len(area), small, alike[small])[solid]
-    patch = np.unique(patch, return_inverse=True)[1].astype(np.int32)
+    patch = _renumbered(group_alike(len(area), small, alike[small])[solid])
     members = np.argsort(patch, kind="stable").astype(np.int32)
     count = int(patch.max()) + 1
     patch_surface = np.empty(count, dtype=np.int32)
@@ -225,9 +224,30 @@ def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
     """(count,) the first of the chosen items with the same row of key (n, k); items that are not chosen stand alone."""
     group = np.arange(count)
     if len(chosen):
-        _, first, same = np.unique(key, axis=0, return_index=True, return_inverse=True)
+        _, first, same = np.unique(row_numbers(key), return_index=True, return_inverse=True)
         group[chosen] = chosen[first][same.reshape(-1)]
     return group
+
+
+def _renumbered(labels: Int64) -> Int32:
+    """The labels (n,) counted through without gaps, in their order."""
+    used = np.zeros(int(labels.max()) + 1, dtype=np.int32)
+    used[labels] = 1
+    return (np.cumsum(used, dtype=np.int32) - 1)[labels]
+
+
+def row_numbers(key: Int64) -> Int64:
+    """(n,) one number for each row of key (n, k): equal, and in the same order, as the rows are."""
+    number, count = np.zeros(len(key), dtype=np.int64), 1
+    for column in key.T if len(key) else ():
+        least = int(column.min())
+        span = int(column.max()) - least + 1
+        if count * span >= 2**63:
+            distinct, number = np.unique(number, return_inverse=True)
+            count = len(distinct)
+        number = number * span + (column - least)
+        count *= span
+    return number
 
 
 def coarser_groups(patches: Patches) -> Int32:
@@ -243,7 +263,7 @@ def coarser_groups(patches: Patches) -> Int32:
     level = np.rint(np.log2(patches.patch_area / median) / 2.0)[:, None]
     edge = 2.0 * np.sqrt(median) * 2.0**level
     key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), patches.surface])
-    return np.unique(key, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
+    return np.unique(row_numbers(key.astype(np.int64)), return_inverse=True)[1].astype(np.int32)
 
 
 def shading_normals(receiver: SceneObject, parent: Int32, barycentric: Float64, normals: Float64) -> Float64:

@@ -151,8 +151,8 @@ class Fit:
         start = self._averages(system) if start is None else start
         return conjugate_gradients(self.matrix(system, alpha), system.target, start, _TOLERANCE, _MAXIMUM_ITERATIONS)
 
-    def solve_within(self, system: System, alpha: float, samples: Samples) -> Float64:
-        """Vertex values (v, k) as those of `solve`, but none brighter or darker than the light around it, and filled.
+    def solve_within(self, system: System, alpha: float, limits: tuple[Float64, Float64]) -> Float64:
+        """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
 
         Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
         the vertex is held at the limit, and the others make the best of that.
@@ -160,7 +160,7 @@ class Fit:
         matrix = self.matrix(system, alpha)
         accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
         free = conjugate_gradients(matrix, system.target, self._averages(system), *accuracy)
-        low, high = self._range(samples)
+        low, high = limits
         values = np.clip(free, low, high)
         held = values != free
         if held.any():
@@ -171,7 +171,7 @@ class Fit:
         averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
         return np.where(self.measured[:, None], averaged, 0.0)
 
-    def _range(self, samples: Samples) -> tuple[Float64, Float64]:
+    def limits(self, samples: Samples) -> tuple[Float64, Float64]:
         """Least and largest light (v, k) that a vertex may have: that of the samples in the triangles around it.
 
         At the rim of a surface all samples lie to one side. The nearest of n samples misses the vertex by about
@@ -206,7 +206,7 @@ class Fit:
         return np.asarray((energy / np.maximum(around, np.finfo(float).tiny))[self._corner].mean(axis=1))
 
     def at_corners(self, values: Float64) -> Float64:
-        """(c, 3, k): what interpolation of vertex values (v, k) starts from in each cell's output triangle."""
+        """(c, 3, ...): what interpolation of vertex values (v, ...) starts from in each cell's output triangle."""
         return values[self._corner]
 
     def _scatter(self, corner_values: Float64) -> Float64:

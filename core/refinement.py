@@ -122,18 +122,20 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
     found = fit_samples(survey, scene, workers)
     coarser = survey.coarser[0] * survey.coarser[1]
-    error, cell_error = estimate_error(found.fits, coarser, survey.receivers.cells.area, found.shown, found.radiance)
+    error, cell_error = estimate_error(found.fits, coarser, found.area, found.shown, found.radiance)
     values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
     return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=survey.buried())
 
 
 @dataclass(frozen=True, eq=False)
 class FittedSurvey:
-    """The fits of direct and, if any, indirect light on one structure. shown (c,): mean square over the channels of
-    albedo / pi, what a squared error of the irradiance counts; radiance: the mean, W/(m^2 sr)."""
+    """The fits of direct and, if any, indirect light on one structure. area (c,): of the cells, as far as they are in
+    sight; shown (c,): mean square over the channels of albedo / pi, what a squared error of the irradiance counts;
+    radiance: the mean, W/(m^2 sr)."""
 
     fit: Fit
     fits: list[Fitted]
+    area: Float64
     shown: Float64
     radiance: float
 
@@ -145,10 +147,11 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
     area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
-    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], area, shown), len(sampled), 1))
+    in_sight = area * survey.share_in_sight
+    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], in_sight, shown), len(sampled), 1))
     reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
     emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
-    return FittedSurvey(fit, fits, shown, emitted + reflected)
+    return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)
 
 
 def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
@@ -157,7 +160,7 @@ def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
     values = []
     for halves, alpha in zip((survey.direct, survey.indirect), alphas, strict=False):
         both = halves[0] + halves[1]
-        values.append(fit.solve_within(fit.system(both), alpha, both))
+        values.append(fit.solve_within(fit.system(both), alpha, fit.limits(both)))
     dark = np.zeros(len(survey.receivers.cells))
     return _light(survey, values, alphas, UNKNOWN, dark, fit)
 

@@ -168,6 +168,11 @@ class Survey:
         """(c,) samples of each cell that are in sight."""
         return self.direct[0].count + self.direct[1].count
 
+    @property
+    def share_in_sight(self) -> Float64:
+        """(c,) share of each cell's samples that are in sight."""
+        return self.valid_samples / np.maximum(self.direct[0].tried + self.direct[1].tried, 1.0)
+
     def run_pass(self) -> None:
         """One more point in every cell."""
         number = self.passes

@@ -7,6 +7,7 @@ triangles from getting thinner ("red-green" refinement: Bank, Sherman, Weiser 19
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,33 +154,47 @@ def edge_for_count(vertices: list[Float64], triangles: list[Int32], wanted: int)
     not use up what all are to share. The count jumps by two or four where many edges have the same length, so it is met
     within a factor of two at worst.
     """
-    edges, areas = _edges_and_areas(vertices, triangles)
-    guess = 2.0 * np.sqrt(areas.sum() / max(wanted, 1))
-    candidates = guess * 2.0 ** np.array(sorted(np.linspace(-2, 2, 33), key=abs))
-    counts = np.array([_full_sized(edges, areas, size) for size in candidates])
-    return float(candidates[np.argmin(np.abs(np.log(counts / wanted)))])
+    measures = _Measures.of(vertices, triangles)
+    candidates = 2.0 * np.sqrt(measures.area.sum() / max(wanted, 1)) * 2.0 ** np.linspace(-2, 2, 33)
+    # The longer the edge the fewer triangles, so the best stands on either side of where the count crosses.
+    sizes = list(range(len(candidates)))
+    crosses = bisect_left(sizes, -float(wanted), key=lambda k: -measures.full_sized(candidates[k]))
+    beside = [k for k in (crosses - 1, crosses) if k in sizes]
+    counts = {k: measures.full_sized(candidates[k]) for k in beside}
+    return float(candidates[min(beside, key=lambda k: abs(np.log(counts[k] / wanted)))])
 
 
 def predicted_count(vertices: list[Float64], triangles: list[Int32], longest_edge: float) -> int:
     """About how many triangles the meshes together split into."""
-    return int(_children(_edges_and_areas(vertices, triangles)[0], longest_edge).sum())
+    return int(_Measures.of(vertices, triangles).children(longest_edge).sum())
 
 
-def _edges_and_areas(vertices: list[Float64], triangles: list[Int32]) -> tuple[Float64, Float64]:
-    """Edge lengths (t, 3) and areas (t,) of all triangles."""
-    corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return np.linalg.norm(corners[:, [1, 2, 0]] - corners, axis=2), np.linalg.norm(cross, axis=1) / 2
+@dataclass(frozen=True, eq=False)
+class _Measures:
+    """Of some triangles (t,): how long the longest and the second longest edge are, as logarithms to base 2, and the
+    area."""
 
+    longest: Float64
+    second: Float64
+    area: Float64
 
-def _full_sized(edges: Float64, areas: Float64, size: float) -> float:
-    """Triangles after splitting, small ones counted by their share of a right-angled one with the longest edge."""
-    children = _children(edges, size)
-    return max(float(np.where(children > 1, children, np.minimum(areas / (size * size / 4), 1.0)).sum()), 1e-9)
+    @staticmethod
+    def of(vertices: list[Float64], triangles: list[Int32]) -> _Measures:
+        corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
+        edges = corners[:, [1, 2, 0]] - corners
+        cross = np.cross(edges[:, 0], edges[:, 1])
+        squared = np.maximum(np.einsum("tij,tij->ti", edges, edges), np.finfo(float).tiny)
+        squared.sort(axis=1)
+        area = np.sqrt(np.einsum("tk,tk->t", cross, cross)) / 2.0
+        return _Measures(np.log2(squared[:, 2]) / 2.0, np.log2(squared[:, 1]) / 2.0, area)
 
+    def children(self, size: float) -> Float64:
+        """Triangles that each splits into, from the number of halvings of its edges: exact for three equal depths."""
+        depths = [np.maximum(np.ceil(edge - np.log2(size) - 1e-9), 0.0) for edge in (self.longest, self.second)]
+        return np.asarray(np.exp2(depths[0] + depths[1]))
 
-def _children(edges: Float64, size: float) -> Float64:
-    """Triangles that each splits into, from the number of halvings of its edges: exact for three equal depths."""
-    depth = np.maximum(np.ceil(np.log2(np.maximum(edges, 1e-300) / size) - 1e-9), 0.0)
-    depth.sort(axis=1)
-    return 2.0 ** (depth[:, 2] + depth[:, 1])
+    def full_sized(self, size: float) -> float:
+        """Triangles after splitting, small ones counted by their share of a right-angled one with the longest edge."""
+        children = self.children(size)
+        share = np.minimum(self.area / (size * size / 4), 1.0)
+        return max(float(np.where(children > 1, children, share).sum()), 1e-9)

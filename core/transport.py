@@ -77,11 +77,9 @@ class Transport:
     def by_code(self, values: Float64) -> Float32:
         """Values (s, k) of sides as a table over ray codes but those of the sky; nothing for lost rays and unreached
         sides."""
-        patches = self.sides.patches
-        table = np.zeros((2 * len(patches), values.shape[1]))
+        table = np.zeros((2 * len(self.sides.patches) + 1, values.shape[1]), dtype=np.float32)
         table[self.sides.side] = values
-        codes = np.concatenate([table[patches.patch], table[patches.patch + len(patches)], np.zeros_like(table[:1])])
-        return codes.astype(np.float32)
+        return table
 
     def over_coarser_patches(self, values: Float64) -> Float64:
         """Values (s, k) averaged over groups of about four neighbouring patches."""

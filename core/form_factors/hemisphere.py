@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..hemisphere import Hemispheres
+from ..hemisphere import Codes, Hemispheres
 from ..parallel import Workers
 from ..patches import Patches
 from ..sampling import GOLDEN, plane_points, stream, triangle_points
@@ -196,11 +196,7 @@ def _look_around(
     patches: Patches, side: Int32, hemispheres: Hemispheres, workers: Workers, seed: int, purpose: str
 ) -> _Look:
     codes = hemispheres.codes
-    # From a ray's code to the side it met. Escaped rays go to a column beyond all sides, ignored ones beyond that.
-    escaped, ignored = 2 * len(patches), 2 * len(patches) + 1
     light = hemispheres.sky.light
-    texels = np.full(len(light), escaped)
-    side_of_code = np.concatenate([patches.patch, patches.patch + len(patches), [ignored], texels]).astype(np.int32)
     points, normals = site_points(patches, side, stream(seed, "sites " + purpose).random((len(side), 1, 3)))
     tinted = patches.optics is not None and patches.optics.tinted
     glows = patches.optics is not None and bool(patches.emission.any())
@@ -210,26 +206,27 @@ def _look_around(
         origins, axes = points[part].reshape(-1, 3), normals[part].reshape(-1, 3)
         looks = hemispheres.cast(origins, axes, axes, rng)
         met = looks.code.reshape(-1, SITES, hemispheres.rays)
-        hidden = _hidden(((met >= codes.triangles) & (met < codes.lost)).mean(axis=2))
+        hidden = _hidden(((met >= codes.patches) & (met < codes.lost)).mean(axis=2))
         if patches.transmission is not None:
             # Both sides of what transmits are coupled patch by patch, so both are open.
             hidden &= ~(patches.transmission[side[part] % len(patches)] > 0.0).any(axis=1)[:, None]
-        columns = side_of_code[met]
-        columns[hidden] = ignored
+        # The codes of sides are their numbers; here it is all one by which texel a ray escaped.
+        columns = np.minimum(met, codes.escaped)
+        columns[hidden] = codes.lost
         columns = columns.reshape(len(met), -1)
         tint = None if looks.tint is None else looks.tint.reshape(*columns.shape, 3)
         glints = np.zeros((len(met) if glows else 0, 3))
         if glows and looks.mirrored is not None:
-            seen = looks.mirrored.reshape(columns.shape) & (columns < escaped)
+            seen = looks.mirrored.reshape(columns.shape) & (columns < codes.lost)
             ray = np.flatnonzero(seen)
             radiance = patches.emission[columns.reshape(-1)[ray] % len(patches)]
             shown = radiance if tint is None else radiance * tint.reshape(-1, 3)[ray]
             np.add.at(glints, ray // columns.shape[1], shown)
         texel = met.reshape(len(met), -1) - codes.escaped
-        skylight = _light_of_escaped(light, texel, columns == escaped, tint)
+        skylight = _light_of_escaped(light, texel, columns == codes.escaped, tint)
         if not tinted:
             columns.sort(axis=1)
-        entries = _tinted_lengths(columns, tint, escaped) if tinted else _run_lengths(columns, escaped)
+        entries = _tinted_lengths(columns, tint, codes) if tinted else _run_lengths(columns, codes)
         return hidden, *entries, skylight, glints, np.array([looks.onward]), np.array([looks.cut])
 
     chunk = max(1, hemispheres.chunk // SITES)
@@ -256,7 +253,7 @@ def _hidden(behind: Float64) -> Bool:
     return np.asarray(inside & outside.any(axis=1, keepdims=True))
 
 
-def _run_lengths(columns: Int32, escaped: int) -> tuple[Index, Int32, Index, Index]:
+def _run_lengths(columns: Int32, codes: Codes) -> tuple[Index, Int32, Index, Index]:
     """Sorted columns (n, k) to entries: how many each row has, their columns and their hits; and the rays escaped."""
     rays = columns.shape[1]
     new = np.ones(columns.shape, dtype=bool)
@@ -264,23 +261,23 @@ def _run_lengths(columns: Int32, escaped: int) -> tuple[Index, Int32, Index, Ind
     start = np.flatnonzero(new)
     hits = np.diff(start, append=columns.size)
     column = columns.reshape(-1)[start]
-    kept = column < escaped
+    kept = column < codes.lost
     length = np.bincount(start[kept] // rays, minlength=len(columns))
-    return length, column[kept], hits[kept], np.count_nonzero(columns == escaped, axis=1)
+    return length, column[kept], hits[kept], np.count_nonzero(columns == codes.escaped, axis=1)
 
 
-def _tinted_lengths(columns: Int32, tint: Float32 | None, escaped: int) -> tuple[Index, Int32, Float64, Float64]:
+def _tinted_lengths(columns: Int32, tint: Float32 | None, codes: Codes) -> tuple[Index, Int32, Float64, Float64]:
     """The same for rays that bring tints (n, k, 3), None where all are one: hits and escaped rays count by them."""
     weight = np.ones((*columns.shape, 3), dtype=np.float32) if tint is None else tint
     order = np.argsort(columns, axis=1, kind="stable")
     columns = np.take_along_axis(columns, order, axis=1)
     weight = np.take_along_axis(weight, order[:, :, None], axis=1).astype(np.float64)
-    length, column, _, _ = _run_lengths(columns, escaped)
+    length, column, _, _ = _run_lengths(columns, codes)
     new = np.ones(columns.shape, dtype=bool)
     new[:, 1:] = columns[:, 1:] != columns[:, :-1]
     start = np.flatnonzero(new)
-    hits = np.add.reduceat(weight.reshape(-1, 3), start, axis=0)[columns.reshape(-1)[start] < escaped]
-    return length, column, hits, np.einsum("nk,nkc->nc", columns == escaped, weight)
+    hits = np.add.reduceat(weight.reshape(-1, 3), start, axis=0)[columns.reshape(-1)[start] < codes.lost]
+    return length, column, hits, np.einsum("nk,nkc->nc", columns == codes.escaped, weight)
 
 
 def _mutual(rows: Rows, sides: Sides) -> Rows:

@@ -113,14 +113,21 @@ def test_two_witnesses_count_by_what_they_know():
     """A thousand cells that agree are sure to one part in a thousand; two that contradict each other know nothing."""
     many, few = np.tile([1.0, 3.0], 500), np.array([1.0, 3.0])
     middle = 2.0 / np.sqrt(STEP_BEND * PARABOLA_BEND)
-    assert _unresolved(few, np.array([1e6, -1e6]), np.full(2, 0.5)).mean() == pytest.approx(middle, rel=1e-3)
-    each = np.full(1000, 1e-3)
-    assert _unresolved(many, np.full(1000, 2 * middle), each).mean() == pytest.approx(2 * middle, rel=5e-3)
+    assert _unresolved(few, np.array([1e6, -1e6]), np.zeros(2), np.full(2, 0.5)).mean() == pytest.approx(
+        middle, rel=1e-3
+    )
+    each, none = np.full(1000, 1e-3), np.zeros(1000)
+    assert _unresolved(many, np.full(1000, 2 * middle), none, each).mean() == pytest.approx(2 * middle, rel=5e-3)
     # It lies where the bends are, and is never less than of a curve nor more than of a step.
-    assert _unresolved(many, np.full(1000, middle), each)[:2] == pytest.approx([middle / 2, middle * 1.5], rel=5e-3)
-    assert _unresolved(many, np.full(1000, 5 * middle), each).mean() == pytest.approx(2.0 / STEP_BEND)
-    assert _unresolved(many, np.full(1000, -middle), each).mean() == pytest.approx(2.0 / PARABOLA_BEND)
-    assert _unresolved(np.zeros(2), np.ones(2), np.ones(2)).tolist() == [0, 0]
+    assert _unresolved(many, np.full(1000, middle), none, each)[:2] == pytest.approx(
+        [middle / 2, middle * 1.5], rel=5e-3
+    )
+    assert _unresolved(many, np.full(1000, 5 * middle), none, each).mean() == pytest.approx(2.0 / STEP_BEND)
+    assert _unresolved(many, np.full(1000, -middle), none, each).mean() == pytest.approx(2.0 / PARABOLA_BEND)
+    assert _unresolved(np.zeros(2), np.ones(2), np.zeros(2), np.ones(2)).tolist() == [0, 0]
+    # Noise a hundred times as large as what is left of it is not known so well that the samples could tell.
+    noisy = _unresolved(many, np.full(1000, 202 * middle), np.full(1000, 200 * middle), each).mean()
+    assert middle < noisy < 1.5 * middle
 
 
 def test_the_mean_of_a_squared_linear_function():

@@ -57,19 +57,19 @@ def test_a_parallel_square_is_met_as_often_as_its_form_factor_says(build, faces_
     u, v = ((0, 2, 0), (2, 0, 0)) if faces_down else ((2, 0, 0), (0, 2, 0))
     patches = build.patches(Scene((build.quad(corner=(-1, -1, 1), u=u, v=v),), SIX), 2)
     codes = look(patches, (0, 0, 0), (0, 0, 1))
-    triangles = len(patches.area)
-    fronts, backs = (codes < triangles).mean(), ((codes >= triangles) & (codes < 2 * triangles)).mean()
+    count = len(patches)
+    fronts, backs = (codes < count).mean(), ((codes >= count) & (codes < 2 * count)).mean()
     met = fronts if side == "front" else backs
     assert met == pytest.approx(4 * 0.138531606, abs=binomial(0.554, len(codes)))
     assert fronts * backs == 0
-    assert (codes == Codes(triangles).escaped).mean() == pytest.approx(1 - met)
+    assert (codes == Codes(count).escaped).mean() == pytest.approx(1 - met)
 
 
-def test_the_code_is_that_of_the_triangle_met(build):
+def test_the_code_is_that_of_the_patch_met(build):
     patches = build.patches(Scene((build.box(inward=True, surface=range(6)),), SIX), 12)
     codes = look(patches, (0.5, 0.5, 0.0), (0, 0, 1))
-    below = patches.corners.max(axis=1)[:, 2] < -0.99
-    assert codes.max() < len(patches.area)
+    below = (patches.corners.max(axis=1)[:, 2] < -0.99)[patches.members[patches.first[:-1]]]
+    assert codes.max() < len(patches)
     assert not below[codes].any()
     seen = np.bincount(codes, minlength=12)[~below]
     assert (seen > 0).all()
@@ -80,13 +80,13 @@ def test_rays_about_a_shading_normal_that_start_below_the_surface_are_lost(build
     patches = build.patches(Scene((build.quad(corner=(0, 0, 50)),), SIX), 2)
     tilted = (np.sqrt(0.75), 0, 0.5)
     codes = look(patches, (0, 0, 0), (0, 0, 1), shading=tilted)
-    assert (codes == Codes(len(patches.area)).lost).mean() == pytest.approx(0.25, abs=binomial(0.25, len(codes)))
+    assert (codes == Codes(len(patches)).lost).mean() == pytest.approx(0.25, abs=binomial(0.25, len(codes)))
 
 
 def test_the_two_halves_of_the_rays_are_each_a_whole_hemisphere(build):
     patches = build.patches(Scene((build.quad(corner=(-1, -1, 1), u=(0, 2, 0), v=(2, 0, 0)),), SIX), 2)
     codes = look(patches, (0, 0, 0), (0, 0, 1), rays=64, count=3000).reshape(3000, 2, 32)
-    share = (codes < len(patches.area)).mean(axis=(0, 2))
+    share = (codes < len(patches)).mean(axis=(0, 2))
     assert share == pytest.approx(4 * 0.138531606, abs=binomial(0.554, 3000 * 32))
     halves = (codes < len(patches.area)).mean(axis=2)
     assert abs(np.corrcoef(halves.T)[0, 1]) < 4 / np.sqrt(3000), "independent, so that their difference is the error"

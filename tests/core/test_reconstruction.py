@@ -278,7 +278,7 @@ def covered(floor, radius):
     inside = np.linalg.norm(floor.cells.corners.mean(axis=1) - [0.1, 0.0, 0], axis=1) < radius
     samples = sample(floor, lambda points: np.full((len(points), 1), 5.0), valid=~inside)
     fit = Fit(floor, samples.count, samples.tried > samples.count)
-    return inside, fit, fit.solve_within(fit.system(samples), 0.05, samples)
+    return inside, fit, fit.solve_within(fit.system(samples), 0.05, fit.limits(samples))
 
 
 def test_what_is_seen_never_shades_into_the_dark_inside_of_a_solid(fine_floor):
@@ -309,7 +309,7 @@ def test_no_vertex_is_brighter_or_darker_than_the_light_around_it(floor):
     samples = sample(floor, step, passes=12)
     fit = fit_of(floor, samples.count)
     system = fit.system(samples)
-    free, within = fit.solve(system, 0.02), fit.solve_within(system, 0.02, samples)
+    free, within = fit.solve(system, 0.02), fit.solve_within(system, 0.02, fit.limits(samples))
     assert free.max() > 3.05
     assert free.min() < 0.95
     inner = (np.abs(at_vertices(floor, lambda points: points)[:, :2]) < [0.99, 0.49]).all(axis=1)
@@ -329,5 +329,5 @@ def test_the_limits_leave_linear_light_alone(floor):
     """To the rim, where no sample is as bright or as dark as the vertex."""
     samples = sample(floor, lambda points: 10.0 + slope(points), passes=12)
     fit = fit_of(floor, samples.count)
-    within = fit.solve_within(fit.system(samples), 0.02, samples)
+    within = fit.solve_within(fit.system(samples), 0.02, fit.limits(samples))
     assert within == pytest.approx(at_vertices(floor, lambda points: 10.0 + slope(points)), abs=1e-6)
