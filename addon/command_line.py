@@ -219,7 +219,7 @@ def _say_what_was_done(report: Report, *, quiet: bool) -> None:
     for warning in report.warnings:
         print(f"radiosity-baker: warning: {warning}", file=sys.stderr)
     if not quiet:
-        print(". ".join([f"Baked {wording.what_was_baked(facts)}", *wording.error_lines(facts)]) + ".")
+        print(". ".join([wording.what_was_baked(facts), *wording.error_lines(facts)]) + ".")
 
 
 def _settings(options: argparse.Namespace) -> Settings:

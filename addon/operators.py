@@ -28,6 +28,7 @@ from . import (
     wording,
 )
 from .job import BakeJob
+from .translations import told
 from .window_bake import WindowBake
 
 
@@ -109,7 +110,7 @@ class OBJECT_OT_radiosity_bake(bpy.types.Operator):
         if asked.show_when_done and view is not None:
             viewport.show(view)
         for warning in result.report.warnings:
-            self.report({"WARNING"}, warning)
+            self.report({"WARNING"}, told(warning))
         self.report({"INFO"}, wording.summary(result.report.as_dict()))
 
 
@@ -226,21 +227,22 @@ def _attempt(operator: bpy.types.Operator, action: Callable[[], set[str] | None]
     try:
         return action() or {"FINISHED"}
     except Cancelled:
-        operator.report({"INFO"}, "Bake cancelled, nothing was changed")
+        operator.report({"INFO"}, told("Bake cancelled, nothing was changed"))
     except SceneError as problem:
-        operator.report({"ERROR"}, str(problem))
+        operator.report({"ERROR"}, told(str(problem)))
     except Exception as problem:  # noqa: BLE001 - nothing a bake throws may vanish
         traceback.print_exc()
-        operator.report({"ERROR"}, f"The bake failed, see the console for details. {type(problem).__name__}: {problem}")
+        failed = f"The bake failed, see the console for details. {type(problem).__name__}: {problem}"
+        operator.report({"ERROR"}, told(failed))
     return {"CANCELLED"}
 
 
 def _can_bake(operator: type[bpy.types.Operator], context: bpy.types.Context) -> bool:
     if BakeJob.running is not None:
-        operator.poll_message_set("A bake is already running")
+        operator.poll_message_set(told("A bake is already running"))
         return False
     if context.mode != "OBJECT":
-        operator.poll_message_set("Switch to Object Mode to bake")
+        operator.poll_message_set(told("Switch to Object Mode to bake"))
         return False
     return True
 

@@ -17,6 +17,7 @@ from .copies import original_of
 from .job import BakeJob
 from .places import PLACES, redraw_panel
 from .planning import Following
+from .translations import told
 from .wording import count, energy_line, error_causes, percent, stage, time_line
 
 #: Of the default interface font at scale 1, on average; and what a panel leaves free at its sides, with an icon.
@@ -257,7 +258,7 @@ def _figure(layout: bpy.types.UILayout, name: str, value: str, *, active: bool =
 def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A text over as many lines as the region's width calls for; Blender's own labels cut it off."""
     width = context.region.width / context.preferences.system.ui_scale - MARGIN
-    for line in textwrap.wrap(text, max(20, int(width / PIXELS_PER_LETTER))):
+    for line in textwrap.wrap(told(text), max(20, int(width / PIXELS_PER_LETTER))):
         layout.label(text=line, icon=icon)
         icon = "NONE" if icon == "NONE" else "BLANK1"
 

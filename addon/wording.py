@@ -13,14 +13,17 @@ from .job import BakeJob
 def summary(report: dict[str, Any]) -> str:
     """What a bake did and how good it is, in one line."""
     error = report["estimated_error"].get("total")
-    quality = "" if error is None else f", estimated error {percent(error)}"
-    return f"Baked {what_was_baked(report)}{quality}"
+    baked = what_was_baked(report)
+    return baked if error is None else tr("{baked}, estimated error {error}").format(baked=baked, error=percent(error))
 
 
 def what_was_baked(report: dict[str, Any]) -> str:
     objects = report["objects"]
-    triangles = sum(entry["triangles"] for entry in objects)
-    return f"{count('object', len(objects))}, {triangles:,} triangles in {report['seconds']['total']:.1f} s"
+    return tr("Baked {objects}, {triangles} in {seconds} s").format(
+        objects=count("object", len(objects)),
+        triangles=count("triangle", sum(entry["triangles"] for entry in objects)),
+        seconds=f"{report['seconds']['total']:.1f}",
+    )
 
 
 def error_lines(report: dict[str, Any]) -> list[str]:
@@ -28,8 +31,8 @@ def error_lines(report: dict[str, Any]) -> list[str]:
     error = report["estimated_error"]
     if "total" not in error:
         return []
-    causes = [f"{cause} {percent(share)}" for cause, share in error_causes(report)]
-    return [f"Estimated error {percent(error['total'])}: {', '.join(causes)}"]
+    causes = ", ".join(f"{tr(cause)} {percent(share)}" for cause, share in error_causes(report))
+    return [tr("Estimated error {error}: {causes}").format(error=percent(error["total"]), causes=causes)]
 
 
 def error_causes(report: dict[str, Any]) -> list[tuple[str, float]]:

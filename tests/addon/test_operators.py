@@ -74,7 +74,9 @@ def test_clear_leaves_nothing_of_a_bake(room, stand_in, mode):
     asked.result, asked.layers = mode, {"direct"}
 
     def everything():
-        return content(), list(room.keys()), list(room.data.keys()), bpy.data.collections.keys(), room.hide_get()
+        # Before 5.0 Blender keeps the object's own settings among its custom properties, once they were looked at.
+        noted = set(room.keys()) - {"radiosity_baker"}
+        return content(), noted, list(room.data.keys()), bpy.data.collections.keys(), room.hide_get()
 
     before = everything()
     bpy.ops.object.radiosity_bake()
