@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .reconstruction import Fit, Samples
+from .reconstruction import Fit, Samples, within
 from .scene import Float64
 
 
@@ -78,7 +78,6 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
     counts."""
     merged = halves[0] + halves[1]
     limits = fit.limits(merged)
-    low, high = (limit @ merged.to_grey for limit in limits)
     grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
     tried: list[_Halves] = []
@@ -86,6 +85,7 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
     for alpha in ALPHAS:
         values = [fit.solve(system, alpha, begin) for system, begin in zip(systems, start, strict=True)]
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
+        low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
         first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
         tried.append(_Halves(alpha, first, second, predicted))

@@ -18,6 +18,10 @@ from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradi
 #: Relative error at which conjugate gradients stop: a tenth of what a person asks for at the finest.
 _TOLERANCE = 5e-4
 _MAXIMUM_ITERATIONS = 100
+#: From how much smoothing on a fit has no overshoot that matters, since noise does.
+_NOISY = 5.0
+#: More than any light; that of several kinds still adds up.
+_ENDLESS = 1e100
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 #: Which of these six belongs to each side of a triangle.
@@ -160,7 +164,7 @@ class Fit:
         matrix = self.matrix(system, alpha)
         accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
         free = conjugate_gradients(matrix, system.target, self._averages(system), *accuracy)
-        low, high = limits
+        low, high = within(limits, alpha)
         values = np.clip(free, low, high)
         held = values != free
         if held.any():
@@ -238,6 +242,13 @@ class Fit:
         beside = np.zeros(self._count, dtype=bool)
         beside[two[self.measured[one]]] = True
         return beside
+
+
+def within(limits: tuple[Float64, Float64], alpha: float) -> tuple[Float64, Float64]:
+    """The limits that a fit so smooth has to keep: those of the samples around a vertex if it may overshoot; none but
+    zero if it averages over many more, for then each of them is mostly noise, and far from where their mean lies."""
+    low, high = limits
+    return limits if alpha < _NOISY else (np.zeros_like(low), np.full_like(high, _ENDLESS))
 
 
 @dataclass(frozen=True, eq=False)
