@@ -52,12 +52,13 @@ class Work:
 @dataclass(frozen=True)
 class Machine:
     """How fast this machine is on one scene. ray: seconds that all threads together need for one; number: seconds that
-    one thread needs to sort one; closed: share of the rays that meet something."""
+    one thread needs to sort one; closed: share of the rays that meet something; onward: that go on from there."""
 
     ray: float
     number: float
     closed: float
     threads: int
+    onward: float = 0.0
 
     def seconds(self, work: Work) -> float:
         looks, factors = work.gather + work.shadow, work.transport * self.closed
@@ -78,11 +79,13 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
     rays = origins.astype(np.float32), directions.astype(np.float32)
     numbers = rng.random(_CALIBRATION)
-    met = np.mean(visibility.nearest(*rays) >= 0)
+    hit = visibility.nearest(*rays)
+    onward = 0.0 if patches.optics is None else np.mean(patches.optics.goes_on[hit] & (hit >= 0))
     with Workers(threads, Progress()) as workers:
         traced = _fastest(lambda: list(workers.map(lambda *_: visibility.nearest(*rays), threads, 1)))
     ordered = _fastest(lambda: np.sort(numbers))
-    return Machine(traced / (threads * _CALIBRATION), ordered / _CALIBRATION, float(met), threads)
+    met = np.mean(hit >= 0)
+    return Machine(traced / (threads * _CALIBRATION), ordered / _CALIBRATION, float(met), threads, float(onward))
 
 
 def _fastest(work: Callable[[], object]) -> float:

@@ -34,7 +34,7 @@ from .scene import (
     Surface,
     Texture,
 )
-from .settings import Settings
+from .settings import Settings, asked_error
 from .sky import equal_texels
 from .textures import triangle_colours, triangle_emission, varying_albedo, varying_emission
 
@@ -193,14 +193,18 @@ def _has_colour(values: Float32 | Float64) -> bool:
 def bounces(scene: Scene, settings: Settings) -> Effect:
     used = {int(i) for o in scene.objects for i in np.unique(o.surface)}
     albedo = max((max(scene.surfaces[i].scattered) for i in used), default=0.0)
+    little = asked_error(settings) / 10.0
     if albedo <= 0:
         return Effect("bounces", False, "every surface is black")
+    if albedo / (1.0 - albedo) < little and not goes_on(scene):
+        return Effect("bounces", False, f"surfaces reflect {albedo:.2%} at most: all bounces would add less than that")
     if settings.estimator == "centroid":
         return Effect("bounces", True, "as the original program did: centroid form factors, plain shooting")
     mean = _mean_albedo(scene)
-    matter = max(1, ceil(log(0.002) / log(mean))) if 0 < mean < 1 else 1
-    rest = f"the next adds at most {mean ** (matter + 1):.2%} in a closed room"
-    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {matter} bounces matter, {rest}")
+    matter = max(1, ceil(log(little) / log(mean)) - 1) if 0 < mean < 1 else 1
+    count = "1 bounce matters" if matter == 1 else f"{matter} bounces matter"
+    rest = f"the next would add {mean ** (matter + 1):.2%} in a closed room"
+    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {count}, {rest}; all are solved at once")
 
 
 def transparency(scene: Scene, _: Settings) -> Effect:

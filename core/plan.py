@@ -9,6 +9,7 @@ import numpy as np
 from .cost import Machine, Work, calibrate
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED
+from .direct.sky import split_bright
 from .effects import (
     LAMPS,
     choose_effects,
@@ -24,12 +25,14 @@ from .openings import find_openings
 from .pilot import Pilot, look_for_sky
 from .result import Effect
 from .scene import Scene
-from .settings import Settings
+from .settings import Settings, asked_error
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
 
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky")
+#: Effects by which rays go on from what they meet.
+ONWARD = ("transparency", "mirrors", "clear glass")
 #: What no single effect costs: points, fit and layers.
 REST = "the rest"
 #: With how many times fewer triangles than asked for the receivers start, to get finer where light calls for it.
@@ -236,9 +239,12 @@ class _Prices:
         pieces = self._pieces
         if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
             pieces = _TREE_COST
-        asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces, 1))
+        suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
+        windows = len(scene.portals) if planned.active("portals") else 0
+        asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces + suns + windows, 1))
         per_light = asked * effort.shadow_rays * (cells * (passes + 1) + 8 * patches)
         lights = {name: sum(isinstance(lamp, kind) for lamp in scene.lamps) for name, kind in LAMPS.items()}
+        lights |= {"sky lights": suns, "portals": windows}
         works = {name: Work(shadow=per_light * count) for name, count in lights.items() if count}
         if pieces:
             works["emitting surfaces"] = Work(shadow=per_light * pieces)
@@ -249,6 +255,9 @@ class _Prices:
                 2 * patches * effort.transport_rays, cells * (passes * effort.gather_rays + looked), patches=patches
             )
             works[first] = replace(look, shadow=works[first].shadow) if first in works else look
+            onward = next((name for name in ONWARD if planned.active(name)), None)
+            if onward:
+                works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
         return {**works, REST: Work(cells=cells, own=self._own, fits=trials + (1 if passes <= effort.passes else 2))}
 
     def _passes(self, effort: Effort, cells: float) -> float:
@@ -285,11 +294,6 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         emitters_by_rays=emitters_by_rays(scene),
         channels=3 if settings.effects.get("colour") or colour(scene, settings).active else 1,
     )
-
-
-def asked_error(settings: Settings) -> float:
-    """The relative error to aim at; by the clock, as small as time allows."""
-    return settings.error or (0.02 if settings.seconds is None else 0.01)
 
 
 def gather_rays(error: float) -> int:

@@ -44,3 +44,8 @@ class Settings:
     threads: int = 0
     layers: tuple[str, ...] = ("combined",)
     effects: Mapping[str, bool] = field(default_factory=dict)
+
+
+def asked_error(settings: Settings) -> float:
+    """The relative error to aim at; by the clock, as small as time allows."""
+    return settings.error or (0.02 if settings.seconds is None else 0.01)

@@ -8,15 +8,25 @@ from pathlib import Path
 
 from .catalogue import EffectScene, all_scenes
 from .measure import FULL, Measured, measure
+from .together import table
 
 DOCS = Path(__file__).resolve().parents[1]
 CACHE = DOCS.parent / "build" / "effects"
+_TOGETHER = """\
+## What effects cost together
+
+One stage under a lamp, to which one thing after the other is added, with as many triangles and passes each time: what
+each costs alone, and what all down to its row cost, beside the sum of what the parts cost alone.
+
+"""
 _HEAD = "| Scene | Simulated | Typical error | Noise of reference | Bias | Processor seconds | Million rays | |"
 _RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
 
 
-def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measured]) -> str:
-    """The document with the rows of the measured scenes renewed, kind by kind; the words before the tables stay."""
+def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measured], costs: Sequence[str] = ()) -> str:
+    """The document with the rows of the measured scenes renewed, kind by kind, and the table of costs if it is given;
+    the words before the tables stay."""
+    text, _, old_costs = text.partition(_TOGETHER)
     rows = {line.split(" | ")[0].removeprefix("| "): line for line in text.splitlines() if line.startswith("| ")}
     rows |= {one.scene.name: f"| {' | '.join(_cells(one))} |" for one in measured}
     rows = {name: rows[name] for name in scenes if name in rows}
@@ -26,7 +36,8 @@ def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measu
     for kind in dict.fromkeys(scenes[name].kind for name in rows):
         own = [row for name, row in rows.items() if scenes[name].kind == kind]
         parts.append("\n".join([f"## {kind.replace('_', ' ').capitalize()}\n", _HEAD, _RULE, *own]))
-    return "\n\n".join(parts) + "\n"
+    table = "\n".join(costs) or old_costs.strip()
+    return "\n\n".join([*parts, *([_TOGETHER + table] if table else [])]) + "\n"
 
 
 def _cells(one: Measured) -> list[str]:
@@ -45,7 +56,9 @@ def _cells(one: Measured) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="effects", description=__doc__)
-    parser.add_argument("names", nargs="*", metavar="SCENE", help="scenes or kinds of scenes; else all")
+    parser.add_argument(
+        "names", nargs="*", metavar="SCENE", help="scenes, kinds of scenes or 'together'; else all of these"
+    )
     parser.add_argument("--list", action="store_true", help="only say which scenes there are")
     options = parser.parse_args()
     scenes = all_scenes()
@@ -56,8 +69,14 @@ def main() -> None:
             continue
         measured = measure(scene, FULL, CACHE)
         print(" | ".join(_cells(measured)), flush=True)
-        report = DOCS / "effects.md"
-        report.write_text(document(report.read_text(encoding="utf-8"), scenes, [measured]), encoding="utf-8")
+        _renew(scenes, [measured])
+    if not options.list and (not options.names or "together" in options.names):
+        _renew(scenes, [], list(table()))
+
+
+def _renew(scenes: dict[str, EffectScene], measured: Sequence[Measured], costs: Sequence[str] = ()) -> None:
+    report = DOCS / "effects.md"
+    report.write_text(document(report.read_text(encoding="utf-8"), scenes, measured, costs), encoding="utf-8")
 
 
 if __name__ == "__main__":

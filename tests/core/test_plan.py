@@ -13,7 +13,7 @@ from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
 from radiosity_baker.core.plan import LOOKING, gather_rays, plan, plan_with_prices
 from radiosity_baker.core.receivers import make_receivers
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
 
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -86,8 +86,28 @@ def test_unused_materials_count_for_nothing(ground):
 
 
 def test_the_number_of_bounces_that_matter(ground):
-    """0.5 ** 9 is the first power of one half under 0.2 %."""
-    assert "about 9 bounces" in effects(ground)["bounces"].reason
+    """0.5 ** 9 is the first power of one half under 0.2 %, a tenth of the asked error: what the ninth would add."""
+    assert "about 8 bounces matter, the next would add 0.20% in a closed room" in effects(ground)["bounces"].reason
+    assert "about 3 bounces matter, the next would add 6.25%" in effects(ground, error=0.8)["bounces"].reason
+
+
+def test_bounces_that_add_less_than_a_tenth_of_the_asked_error_are_left_out(ground):
+    """At an albedo of 0.001 all of them add at most 0.001 / 0.999."""
+    nearly_black = replace(ground, surfaces=(Surface("soot", (0.001, 0.001, 0.001)),))
+    assert not effects(nearly_black)["bounces"].active
+    assert effects(nearly_black, error=0.01)["bounces"].active
+
+
+def test_every_light_and_what_rays_go_on_from_has_its_price(build):
+    sky = np.full((16, 32, 3), 0.5, dtype=np.float32)
+    sky[12, 5:7] = 50.0
+    portal = Portal("window", (0, 0, -5), (0.3, 0, 0), (0, 0.3, 0), (0, 0, -1))
+    floor, veil = build.quad("floor"), build.quad("veil", (0, 0, 1), surface=1, receives=False)
+    surfaces = (build.grey, Surface("gauze", opacity=0.5))
+    scene = Scene((floor, veil), surfaces, tuple(LAMPS.values()), sky=SkyMap(sky), portals=(portal,))
+    costs = plan(scene, Settings()).costs
+    assert {*LAMPS, "sky lights", "portals", "transparency", "bounces"} <= set(costs)
+    assert min(costs.values()) > 0
 
 
 def test_many_emitting_triangles_are_left_to_the_rays(build):

@@ -6,6 +6,8 @@ import bpy
 import pytest
 
 from radiosity_baker.core.effects import EFFECTS
+from radiosity_baker.core.settings import Settings
+from radiosity_baker.docs.effects import together
 from radiosity_baker.docs.effects.__main__ import document
 from radiosity_baker.docs.effects.catalogue import all_scenes, built
 from radiosity_baker.docs.effects.measure import QUICK, measure
@@ -57,3 +59,16 @@ def test_the_document_keeps_its_words_and_the_rows_that_were_not_measured(tmp_pa
     assert "| square area lamp | area lamps" in text
     assert "gone" not in text
     assert document(text, SCENES, [measured]) == text
+    with_costs = document(text, SCENES, [], ["| Thing | Alone |", "| --- | --- |", "| a sun | +1.0 |"])
+    assert with_costs.startswith(text.rstrip())
+    assert with_costs.endswith("| a sun | +1.0 |\n")
+    assert document(with_costs, SCENES, [measured]) == with_costs
+
+
+def test_what_is_added_to_the_stage_together_costs_its_rays(monkeypatch):
+    """A sun alone asks for shadow rays, and the sum of the parts is that of seconds and rays apart."""
+    monkeypatch.setattr(together, "SETTINGS", Settings(size=0.8, error=None, threads=1))
+    monkeypatch.setattr(together, "_TIMES", 1)
+    nothing, sun = together.cost([]), together.cost(["a sun"])
+    assert (sun - nothing).rays > 0
+    assert (sun - nothing + nothing).rays == sun.rays
