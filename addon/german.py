@@ -331,9 +331,11 @@ SENTENCES = {
     "every surface is black": "jede Fläche ist schwarz",
     "as the original program did: centroid form factors, plain shooting": "wie im ursprünglichen Programm: "
     "Schwerpunkt-Formfaktoren, einfaches Verteilen",
-    "surfaces reflect {share}: about {number} bounces matter, the next adds at most {rest} in a closed "
-    "room": "Flächen reflektieren {share}: etwa {number} Reflexionen zählen, die nächste bringt in einem geschlossenen "
-    "Raum höchstens {rest}",
+    "surfaces reflect {share}: after bounce {number} the next would add {rest} in a closed "
+    "room": "Flächen reflektieren {share}: nach Reflexion {number} brächte die nächste in einem geschlossenen Raum "
+    "{rest}",
+    "surfaces reflect {share} at most: no bounce would show": "Flächen reflektieren höchstens {share}: keine Reflexion "
+    "wäre zu sehen",
     "every surface is opaque": "jede Fläche ist undurchsichtig",
     "{names} let light through": "{names} lassen Licht durch",
     "{names} cast no shadow": "{names} werfen keinen Schatten",

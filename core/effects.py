@@ -197,14 +197,17 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
     if albedo <= 0:
         return Effect("bounces", False, "every surface is black")
     if albedo / (1.0 - albedo) < little and not goes_on(scene):
-        return Effect("bounces", False, f"surfaces reflect {albedo:.2%} at most: all bounces would add less than that")
+        return Effect("bounces", False, f"surfaces reflect {albedo:.2%} at most: no bounce would show")
     if settings.estimator == "centroid":
         return Effect("bounces", True, "as the original program did: centroid form factors, plain shooting")
     mean = _mean_albedo(scene)
     matter = max(1, ceil(log(little) / log(mean)) - 1) if 0 < mean < 1 else 1
-    count = "1 bounce matters" if matter == 1 else f"{matter} bounces matter"
-    rest = f"the next would add {mean ** (matter + 1):.2%} in a closed room"
-    return Effect("bounces", True, f"surfaces reflect {mean:.0%}: about {count}, {rest}; all are solved at once")
+    left = mean ** (matter + 1)
+    return Effect(
+        "bounces",
+        True,
+        f"surfaces reflect {mean:.0%}: after bounce {matter} the next would add {left:.2%} in a closed room",
+    )
 
 
 def transparency(scene: Scene, _: Settings) -> Effect:
