@@ -193,7 +193,8 @@ class Fit:
         samples_around = self._scatter(np.repeat(samples.count[:, None], 3, axis=1))
         share = np.where(self._surrounded | cut_off, 0.0, 2.0 / np.sqrt(np.maximum(samples_around, 4.0)))
         beyond = share[:, None] * (high - low)
-        return np.maximum(low - beyond, 0.0), high + beyond
+        # A sample of a hardly lit place may be below zero, so that many are right on average.
+        return np.maximum(low - beyond, 0.0), np.maximum(high + beyond, 0.0)
 
     def matrix(self, system: System, alpha: float) -> SymmetricMatrix:
         """The mass plus alpha times the penalty."""

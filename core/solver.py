@@ -18,6 +18,8 @@ from .scene import Float64
 #: Shooting passes before the finish: what the first bounces bring is what a person watches.
 _WATCHED_PASSES = 2
 _MAXIMUM_ITERATIONS = 200
+#: A relative error that rounding leaves.
+_SOLVED = 1e-12
 #: Former directions that a new one is made independent of.
 _REMEMBERED = 12
 
@@ -107,11 +109,12 @@ def _conjugate_gradients(
     preconditioned = weight * residual
     direction = preconditioned.copy()
     energy = np.sum(residual * preconditioned, axis=0)
-    iteration, bound = 0, np.inf
-    while bound > tolerance and iteration < _MAXIMUM_ITERATIONS:
+    iteration, bounds = 0, np.full(direct.shape[1], np.inf)
+    while (bounds > tolerance).any() and iteration < _MAXIMUM_ITERATIONS:
         iteration += 1
         image = operator(direction)
-        step = energy / np.maximum(np.sum(direction * image, axis=0), np.finfo(float).tiny)
+        # A channel that is solved to rounding rests while others go on: what is left of it points nowhere.
+        step = energy / np.maximum(np.sum(direction * image, axis=0), np.finfo(float).tiny) * (bounds > _SOLVED)
         z = z + step * direction
         residual = residual - step * image
         preconditioned = weight * residual
@@ -119,9 +122,9 @@ def _conjugate_gradients(
         direction = preconditioned + fresh / np.maximum(energy, np.finfo(float).tiny) * direction
         energy = fresh
         # One more pass would move the reflected light, root z, by root times the scaled residual.
-        bound = _relative(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
+        bounds = _relative_by_channel(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
     irradiance = direct + factors.apply(root * z, workers)
-    return Solution(np.maximum(irradiance, 0.0), _WATCHED_PASSES + iteration, bound)
+    return Solution(irradiance, _WATCHED_PASSES + iteration, float(bounds.max()))
 
 
 def solve_both_sides(
@@ -142,7 +145,7 @@ def solve_both_sides(
     while True:
         bound = _relative(residual, accumulated) / max(1.0 - q, 1e-12)
         if bound <= tolerance or iteration == _MAXIMUM_ITERATIONS:
-            return Solution(np.maximum(accumulated, 0.0), iteration, bound)
+            return Solution(accumulated, iteration, bound)
         iteration += 1
         direction = residual
         image = direction - returning(direction)
@@ -157,5 +160,9 @@ def solve_both_sides(
 
 def _relative(change: Float64, whole: Float64) -> float:
     """The largest change (s, c) of any side, relative to the channel's largest value."""
+    return float(_relative_by_channel(change, whole).max())
+
+
+def _relative_by_channel(change: Float64, whole: Float64) -> Float64:
     scale = np.maximum(np.abs(whole).max(axis=0), np.finfo(float).tiny)
-    return float(np.max(np.abs(change).max(axis=0) / scale))
+    return np.asarray(np.abs(change).max(axis=0) / scale)

@@ -9,6 +9,8 @@ from .tessellation import Int64
 
 #: Share of the rows that are kept in line whole; what longer rows have beyond that width is kept aside.
 _IN_LINE = 0.98
+#: What rounding leaves of a residual, relative to the target.
+_ROUNDING = 1e-12
 #: Rows a chunk of the product: its terms stay in the processor's caches.
 _CHUNK_ROWS = 8192
 
@@ -80,6 +82,7 @@ def conjugate_gradients(
     """
     diagonal = matrix.diagonal
     inverse = np.where(diagonal > 0, 1.0 / np.where(diagonal > 0, diagonal, 1.0), 0.0)[:, None]
+    rounding = _ROUNDING**2 * np.einsum("vk,vk->k", target, inverse * target)
     if held is not None:
         inverse = np.where(held, 0.0, inverse)
     x = start.copy()
@@ -87,12 +90,14 @@ def conjugate_gradients(
     scaled = inverse * residual
     direction = scaled.copy()
     energy = np.einsum("vk,vk->k", residual, scaled)
-    enough = tolerance**2 * np.maximum(np.einsum("vk,vk->k", target, inverse * target), np.finfo(float).tiny)
+    enough = np.maximum(tolerance**2 * np.einsum("vk,vk->k", target, inverse * target), rounding)
     for _ in range(most):
         if (energy <= enough).all():
             break
         image = matrix @ direction
+        # A channel that is solved to rounding rests while others go on: what is left of it points nowhere.
         step = energy / np.maximum(np.einsum("vk,vk->k", direction, image), np.finfo(float).tiny)
+        step *= energy > rounding
         x += step * direction
         image *= step
         residual -= image

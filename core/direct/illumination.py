@@ -264,10 +264,12 @@ def _seen(share: Float64, weights: Float32, arrived: Float32) -> Float64:
 
 def _seen_in_all(every: Float64, expected: Float64, arrived: Float64) -> Float64:
     """The same (h, n, 3) for lights that were drawn by each half: every (n, 3) is what all of them would bring, and so
-    what is expected (h, n, 3) on average, of which so much arrived."""
-    whole = expected.sum(axis=2)
-    free = np.divide(arrived.sum(axis=2), whole, out=np.ones_like(whole), where=whole > 0)
-    other = free[::-1, :, None]
+    what is expected (h, n, 3) on average, of which so much arrived. Each channel by itself, for one light may be
+    free and another, of another colour, not; all together tell of one that a half drew no light of."""
+    whole = expected.sum(axis=2, keepdims=True)
+    free = np.divide(arrived.sum(axis=2, keepdims=True), whole, out=np.ones_like(whole), where=whole > 0)
+    free = np.divide(arrived, expected, out=np.broadcast_to(free, arrived.shape).copy(), where=expected > 0)
+    other = free[::-1]
     return np.asarray(other * every + (arrived - other * expected))
 
 
