@@ -45,7 +45,10 @@ def emitting_panels(scene: Scene, space: Space) -> list[Source]:
         return []
     if emitting_triangles(scene) > MOST_PANELS:
         return [_tree(scene, space)]
-    return [Panel(p.name, space.normalise(p.corners), p.radiance, two_sided=True) for p in emitting_pieces(scene)]
+    placed = [(piece, space.normalise(piece.corners)) for piece in emitting_pieces(scene)]
+    # What rounding gives an area far from the origin may have none at home.
+    solid = [(piece, corners) for piece, corners in placed if triangle_geometry(corners[None])[1][0] > 0]
+    return [Panel(piece.name, corners, piece.radiance, two_sided=True) for piece, corners in solid]
 
 
 def _tree(scene: Scene, space: Space) -> EmitterTree:

@@ -245,7 +245,7 @@ class Stages:
         self.workers.__exit__()
 
 
-@tries(80)
+@tries(120)
 @given(scenes(), st.sampled_from(["hemisphere", "hemisphere", "analytic"]))
 def test_light_is_neither_made_nor_lost(scene, estimator):
     """Reciprocity A_i F_ij = A_j F_ji to single precision; row sums, escape and loss at most 1 and, where a side sees
@@ -271,7 +271,7 @@ def test_light_is_neither_made_nor_lost(scene, estimator):
         dark = (transport.incoming < 0).any(axis=0)  # by noise
         assert (light >= transport.incoming * (1 - 1e-6))[:, ~dark].all()
         ledger = transport.energy()
-        assert abs(ledger["residual"]) <= 1e-6 * ledger["emitted"], ledger
+        assert abs(ledger["residual"]) <= 1e-6 * max(map(abs, ledger.values())), ledger
 
 
 def without_size(lamp):
@@ -307,7 +307,7 @@ def test_the_light_of_all_lamps_is_the_sum_of_the_light_of_each(scene, estimator
             assert (half.irradiance <= alone[0].solution.irradiance + 2e-9 * whole.max()).all(), albedo
 
 
-@tries(25)
+@tries(15)
 @given(scenes(), st.booleans())
 def test_what_is_baked_can_be_shown(scene, tessellate):
     """All layers are finite and not negative, and the same bytes with 1 and 2 threads, whatever the order of objects
@@ -318,7 +318,7 @@ def test_what_is_baked_can_be_shown(scene, tessellate):
         assert np.isfinite(values).all(), name
         assert values.min(initial=0) >= 0, name
     ledger = first.report.energy
-    assert abs(ledger["residual"]) <= 1e-6 * ledger["emitted"], ledger
+    assert abs(ledger["residual"]) <= 1e-6 * max(map(abs, ledger.values())), ledger
     turned = replace(scene, objects=scene.objects[::-1], lamps=scene.lamps[::-1])
     two = layers_of(quick_bake(turned, threads=2, tessellate=tessellate))
     assert all(values.tobytes() == two[name].tobytes() for name, values in one.items())
@@ -338,7 +338,7 @@ def brighter(scene: Scene, factor: float) -> Scene:
     return replace(scene, lamps=tuple(map(lamp_more, scene.lamps)), surfaces=surfaces, sky=more(scene.sky))
 
 
-@tries(20)
+@tries(10)
 @given(scenes(), st.sampled_from([2.0**-10, 4.0, 2.0**20]))
 def test_twice_the_light_is_twice_as_bright(scene, factor):
     """Exactly, since every decision of a bake is relative and a power of two rounds nothing. Seen to fail: an absolute
@@ -380,7 +380,7 @@ CHANGES = {
 }
 
 
-@tries(25)
+@tries(15)
 @given(scenes(), st.sampled_from(sorted(CHANGES)))
 def test_nothing_depends_on_where_or_how_the_scene_is_given(scene, change):
     """The mean light is the same, within twice what both bakes state as their errors: statements from so few samples.
@@ -396,7 +396,7 @@ def test_nothing_depends_on_where_or_how_the_scene_is_given(scene, change):
     assert abs(one - two) <= 2 * (one_off + two_off) + 1e-3 * max(one, two)
 
 
-@tries(20)
+@tries(10)
 @given(scenes(), st.booleans())
 def test_a_closed_room_sees_no_sky(scene, inward):
     """Catches cracks and leaks: rays that start behind their wall, seams that are not tight, and lost hits. Seen to
