@@ -138,7 +138,7 @@ class KnownLight:
 
 def known_light() -> Iterator[KnownLight]:
     """All of them. Where no shadow falls and nothing is blocked, only interpolation is left: see the slacks."""
-    for albedo in (0.5, 0.9, 0.99, 0.999):
+    for albedo in (0.5, 0.9, 0.99, 0.999, 0.9999):
         yield furnace(albedo)
     white, half = _grey(0.8), _grey(0.5)
     ground = quad("ground")

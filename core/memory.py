@@ -21,12 +21,13 @@ from .direct.lamps import place
 from .parallel import Workers
 from .receivers import cell_colours
 from .refinement import Light, fit_alone, mean_reflected, refine
+from .report import mean_energy
 from .result import BakeResult
 from .scene import LAMP_COLOUR, Float64, Lamp, Scene
 from .settings import Settings
 from .sky import Sky
 from .survey import Survey, look_up
-from .transport import HALVES, fill_with_light
+from .transport import HALVES, Transport, fill_with_light
 
 #: A lamp that becomes so many times as bright would want triangles and samples of its own.
 _MOST_GROWTH = 4.0
@@ -40,7 +41,15 @@ class _Last:
     settings: Settings
     baked: Baked
     light: Light
-    responses: dict[str, Light] = field(default_factory=dict)
+    responses: dict[str, _Response] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class _Response:
+    """What one lamp alone brings, in plain white: its light, and the solved halves that it was gathered from."""
+
+    light: Light
+    halves: tuple[Transport, ...]
 
 
 class Memory:
@@ -80,6 +89,7 @@ class Memory:
                 with clock.stage("relight", 0.1):
                     last.responses[name] = _response(last.baked, name, last.light.alphas, workers, rays)
         result = last.baked.result(_relit(last, changes), settings, clock)
+        result.report.energy = _ledger(last, changes)
         rays.update(survey.rays)
         result.report.rays = {"total": rays.total(), **{purpose: count for purpose, count in rays.items() if count}}
         return result
@@ -157,7 +167,7 @@ def _relit(last: _Last, changes: dict[str, Float64]) -> Light:
         return light
     brightness = doubt = _brightness(last.baked, light)
     for name, change in changes.items():
-        response = last.responses[name]
+        response = last.responses[name].light
         light = replace(
             light,
             lamps=np.maximum(light.lamps + change * response.lamps, 0.0),
@@ -172,7 +182,16 @@ def _relit(last: _Last, changes: dict[str, Float64]) -> Light:
     )
 
 
-def _response(baked: Baked, name: str, alphas: tuple[float, ...], workers: Workers, rays: Counter[str]) -> Light:
+def _ledger(last: _Last, changes: dict[str, Float64]) -> dict[str, float]:
+    """Where the light went, W, with the change (3,) of each lamp."""
+    ledger = mean_energy(last.baked.halves)
+    for name, change in changes.items():
+        for account, more in mean_energy(last.responses[name].halves, change / 3.0).items():
+            ledger[account] += more
+    return ledger
+
+
+def _response(baked: Baked, name: str, alphas: tuple[float, ...], workers: Workers, rays: Counter[str]) -> _Response:
     """The light of one lamp alone, in plain white, with the smoothing of the whole. Counts its rays by purpose."""
     plan, survey = baked.plan, baked.survey
     effort, seed, black = replace(plan.effort, emitters_by_rays=False), survey.seed, Sky.of((0.0, 0.0, 0.0))
@@ -189,7 +208,7 @@ def _response(baked: Baked, name: str, alphas: tuple[float, ...], workers: Worke
         alone.run_pass()
     alone.refine_boundaries(effort.boundary_passes)
     rays.update(alone.rays)
-    return fit_alone(alone, alphas)
+    return _Response(fit_alone(alone, alphas), tuple(halves))
 
 
 def _brightness(baked: Baked, light: Light) -> float:

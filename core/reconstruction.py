@@ -22,6 +22,8 @@ _MAXIMUM_ITERATIONS = 100
 _NOISY = 5.0
 #: More than any light; that of several kinds still adds up.
 _ENDLESS = 1e100
+#: How much light limits may add or take in all, relatively, before it is passed on, and how far it is.
+_ADDED, _MOST_RINGS = 5e-3, 30
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 #: Which of these six belongs to each side of a triangle.
@@ -159,7 +161,7 @@ class Fit:
         """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
 
         Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
-        the vertex is held at the limit, and the others make the best of that.
+        the vertex is held at the limit, and the others make the best of that; the mean stays that of the samples.
         """
         matrix = self.matrix(system, alpha)
         accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
@@ -168,8 +170,37 @@ class Fit:
         values = np.clip(free, low, high)
         held = values != free
         if held.any():
-            values = np.clip(conjugate_gradients(matrix, system.target, values, *accuracy, held), low, high)
+            freer = conjugate_gradients(matrix, system.target, values, *accuracy, held)
+            values = np.clip(freer, low, high)
+            pressed = np.where(held, matrix @ freer - system.target, 0.0)
+            added = np.asarray(pressed + system.lumped[:, None] * (values - freer), dtype=np.float64)
+            values = self._passed_on(values, added, system.lumped, low, high)
         return self.fill(values)
+
+    def _passed_on(self, values: Float64, added: Float64, weight: Float64, low: Float64, high: Float64) -> Float64:
+        """The values (v, k) without what limits have added to them, or taken: it goes to the nearest vertices that can
+        take it, within their own limits (v, k), for what one cannot, its neighbours share.
+
+        added (v, k): light times weight, weight (v,): how much of the surface each vertex stands for.
+        """
+        one, two = self._neighbours()
+        open_edges = (weight[one] > 0) & (weight[two] > 0)
+        one, two = one[open_edges], two[open_edges]
+        sharing = np.maximum(np.bincount(one, minlength=self._count), 1)[:, None]
+        weight = np.maximum(weight, np.finfo(float).tiny)[:, None]
+        enough = _ADDED * np.abs(np.sum(weight * values, axis=0))
+        for _ in range(_MOST_RINGS):
+            if (np.abs(added).sum(axis=0) <= enough).all():
+                break
+            fresh = np.clip(values - added / weight, low, high)
+            share = (added + weight * (fresh - values)) / sharing
+            added = np.stack([np.bincount(two, channel[one], self._count) for channel in share.T], axis=1)
+            values = fresh
+        else:
+            # So few places are lit that nothing near takes it: all of them share the rest.
+            total = np.maximum(np.sum(weight * values, axis=0), np.finfo(float).tiny)
+            values = values * np.maximum(1.0 - added.sum(axis=0) / total, 0.0)
+        return values
 
     def _averages(self, system: System) -> Float64:
         averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]

@@ -11,6 +11,7 @@ from .patches import Patches
 from .plan import Plan
 from .refinement import Light
 from .result import BakedObject, Report
+from .scene import Float64
 from .settings import Settings
 from .survey import Survey
 from .transport import Transport
@@ -35,7 +36,7 @@ def make_report(
         iterations=max((h.solution.iterations for h in halves), default=0),
         threads=survey.workers.threads,
         estimated_error=light.error.as_dict(),
-        energy=_mean_energy(halves),
+        energy=mean_energy(halves),
         effects=list(plan.effects),
         objects=[
             {"name": o.name, "attribute": "", "triangles": len(o.triangles), "corners": 3 * len(o.triangles)}
@@ -54,8 +55,9 @@ def make_report(
     )
 
 
-def _mean_energy(halves: tuple[Transport, ...]) -> dict[str, float]:
-    ledgers = [half.energy() for half in halves]
+def mean_energy(halves: tuple[Transport, ...], channels: Float64 | float = 1.0 / 3.0) -> dict[str, float]:
+    """The ledger of the light that both halves found, W, as Transport.energy tells it."""
+    ledgers = [half.energy(channels) for half in halves]
     names = ("emitted", "absorbed", "escaped", "residual")
     return {name: sum(ledger[name] for ledger in ledgers) / max(len(ledgers), 1) for name in names}
 

@@ -89,11 +89,11 @@ class Transport:
         means = [np.bincount(group, self.sides.area * v) / np.maximum(area, 1e-300) for v in values.T]
         return np.stack(means, axis=1)[group]
 
-    def energy(self) -> dict[str, float]:
+    def energy(self, channels: Float64 | float = 1.0 / 3.0) -> dict[str, float]:
         """Where the light went, in W: what reached the surfaces first, what they absorbed, what left by the openings,
-        and what the solve left unshot. The first is the sum of the others."""
+        and what the solve left unshot. The first is the sum of the others. channels (3,): what each counts."""
         metres = self.sides.patches.space.metres
-        area = self.sides.area[:, None] * metres**2 / 3.0
+        area = self.sides.area[:, None] * metres**2 * channels
         emitted = float(np.sum(area * self.incoming))
         absorbed = float(np.sum(area * (self.solution.irradiance - self.reflected + self.lost * self.reflected)))
         escaped = float(np.sum(area * self.escape * self.reflected))

@@ -54,6 +54,22 @@ def test_a_lamp_that_has_changed_lights_as_if_baked_anew(room, intensity):
         assert of_one == pytest.approx(of_other, abs=3 * stated * mean)
 
 
+@pytest.mark.parametrize("factor", [0.0, 2.0])
+def test_the_ledger_is_that_of_the_lamps_there_are(room, factor):
+    """All lamps dimmed alike, and so is what they give and where it goes. Seen to fail: the ledger of the last bake."""
+    memory = Memory()
+    first = bake(room, SETTINGS, memory=memory).report.energy
+    dimmed = tuple(
+        replace(lamp, **{name: tuple(factor * channel for channel in getattr(lamp, name))})
+        for lamp, name in zip(room.lamps, ("intensity", "radiance"), strict=True)
+    )
+    relit = bake(replace(room, lamps=dimmed), SETTINGS, memory=memory).report.energy
+    off = 0.02 * first["emitted"]  # each lamp alone draws other rays than all together
+    for account in ("emitted", "absorbed", "escaped"):
+        assert relit[account] == pytest.approx(factor * first[account], abs=off)
+    assert relit["residual"] == pytest.approx(0.0, abs=2e-3 * first["emitted"])
+
+
 def test_the_second_change_of_a_lamp_casts_no_ray(room):
     memory = Memory()
     first = bake(room, SETTINGS, memory=memory)
