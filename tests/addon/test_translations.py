@@ -93,8 +93,6 @@ PARTS = {
     "7 sampled as suns",
     "an opening that was found",
     "7 openings that were found",
-    "the next adds at most 7 in a closed room",
-    "surfaces reflect 7: about 7 bounces matter, 7",
     "Bytes hold values up to 1, and those from there to 7 were cut off",
     "7: bake with an exposure of 7 stops, or to float colours.",
 }
