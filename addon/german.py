@@ -10,8 +10,8 @@ WORDS = {
     "Check and Plan": "Prüfen und planen",
     "Advanced": "Erweitert",
     "Light": "Licht",
-    "Bake Again": "Erneut backen",
-    "Clear": "Löschen",
+    "Bake Again": "Neu backen",
+    "Clear": "Entfernen",
     "Nothing stands in the way": "Nichts steht im Weg",
     "Not Simulated": "Nicht simuliert",
     "The scene has changed since": "Die Szene hat sich seitdem geändert",
@@ -63,14 +63,14 @@ WORDS = {
     "Own Tessellation": "Eigene Unterteilung",
     "Longest Edge": "Längste Kante",
     # Choices
-    "Combined": "Gesamt",
+    "Combined": "Kombiniert",
     "Direct": "Direkt",
     "Indirect": "Indirekt",
     "Emission": "Emission",
     "Sky": "Himmel",
     "Unreached": "Unerreicht",
     "Escaped": "Entkommen",
-    "Accuracy": "Genauigkeit",
+    "Accuracy": "Güte",
     "New Object": "Neues Objekt",
     "Replace": "Ersetzen",
     "Keep Topology": "Topologie behalten",
@@ -82,7 +82,7 @@ WORDS = {
     "Face Corner": "Flächenecke",
     "Vertex": "Punkt",
     "Color": "Farbe",
-    "Byte Color": "Byte-Farbe",
+    "Byte Color": "Byte Farbe",
     # Tooltips
     "A colour for each corner of each face: edges stay sharp": "Eine Farbe für jede Ecke jeder Fläche: Kanten bleiben "
     "scharf",
@@ -146,7 +146,8 @@ WORDS = {
     "gleiche Startwert gibt das gleiche Ergebnis, bis aufs letzte Bit",
     "Number of processor cores to use; 0 uses all of them": "Zahl der Prozessorkerne; 0 nimmt alle",
     "Kinds of light to store in colour attributes of their own (hold Shift to choose several). Combined is always "
-    "among them": "Arten von Licht, die eigene Farbattribute bekommen (mehrere mit Umschalt). Gesamt ist immer dabei",
+    "among them": "Arten von Licht, die eigene Farbattribute bekommen (mehrere mit Umschalt). Kombiniert ist immer "
+    "dabei",
     "Name of the colour attribute that holds the combined light; the other layers add theirs to it": "Name des "
     "Farbattributs mit dem Gesamtlicht; die anderen Ebenen hängen ihren an",
     "Show the light in the viewport as far as it has come, pass by pass": "Das Licht in der Ansicht zeigen, so weit es "
@@ -216,7 +217,7 @@ WORDS = {
     "Writing": "Schreibt",
     "Keeping": "Behält",
     "Waiting for Object Mode": "Wartet auf den Objektmodus",
-    "Starting": "Beginnt",
+    "Starting": "Starten",
     "Tessellate": "Unterteilen",
     "Transport": "Lichtaustausch",
     "Gather": "Sammeln",
@@ -257,7 +258,7 @@ WORDS = {
     "Needs about {needed} MB of memory, and {free} MB are free": "Braucht etwa {needed} MB Speicher, und {free} MB "
     "sind frei",
     "Recalculate Normals": "Normalen neu berechnen",
-    "Flip Normals": "Normalen umdrehen",
+    "Flip Normals": "Normalen umkehren",
     "Remove Duplicates": "Doppelte entfernen",
     "Dissolve": "Auflösen",
     "Darken to 90 %": "Auf 90 % abdunkeln",
@@ -267,25 +268,27 @@ WORDS = {
     "Use Half the Triangles": "Halb so viele Dreiecke",
 }
 
-#: Effects of light, by the names that the panel shows.
+#: Effects of light, by their names.
 WORDS |= {
-    "Point lamps": "Punktlampen",
-    "Spot lamps": "Spotlampen",
-    "Sun": "Sonne",
-    "Area lamps": "Flächenlampen",
-    "Shadows": "Schatten",
-    "Soft shadows": "Weiche Schatten",
-    "Emitting surfaces": "Leuchtende Flächen",
-    "Sky map": "Himmelsbild",
-    "Sky lights": "Helle Himmelsstellen",
-    "Portals": "Portale",
-    "Transparency": "Durchsichtigkeit",
-    "Diffuse transmission": "Durchscheinen",
-    "Mirrors": "Spiegel",
-    "Clear glass": "Klares Glas",
-    "Colour": "Farbe",
-    "Albedo textures": "Farbtexturen",
-    "Textured emission": "Leuchttexturen",
+    "point lamps": "Punktlampen",
+    "spot lamps": "Spotlampen",
+    "sun": "Sonne",
+    "area lamps": "Flächenlampen",
+    "shadows": "Schatten",
+    "soft shadows": "Weiche Schatten",
+    "emitting surfaces": "Leuchtende Flächen",
+    "sky map": "Himmelsbild",
+    "sky lights": "Helle Himmelsstellen",
+    "portals": "Portale",
+    "bounces": "Reflexionen",
+    "sky": "Himmel",
+    "transparency": "Durchsichtigkeit",
+    "diffuse transmission": "Durchscheinen",
+    "mirrors": "Spiegel",
+    "clear glass": "Klares Glas",
+    "colour": "Farbe",
+    "albedo textures": "Farbtexturen",
+    "textured emission": "Leuchttexturen",
 }
 
 #: Why an effect is simulated, or not.

@@ -17,7 +17,7 @@ from .copies import original_of
 from .job import BakeJob
 from .places import PLACES, redraw_panel
 from .planning import Following
-from .translations import told
+from .translations import CONTEXT, told
 from .wording import count, energy_line, error_causes, percent, stage, time_line
 
 #: Of the default interface font at scale 1, on average; and what a panel leaves free at its sides, with an icon.
@@ -207,11 +207,13 @@ def _draw_effect(layout: bpy.types.UILayout, context: bpy.types.Context, effect:
     """A switch, and the reason why it stands as it does."""
     column = layout.column(align=True)
     column.active = effect["active"]
+    name = told(effect["name"])
     row = column.row()
     row.alignment = "LEFT"
     switch = row.operator(
         "object.radiosity_switch_effect",
-        text=effect["name"].capitalize(),
+        text=name[0].upper() + name[1:],
+        translate=False,
         icon="CHECKBOX_HLT" if effect["active"] else "CHECKBOX_DEHLT",
         emboss=False,
     )
@@ -251,7 +253,7 @@ def _figure(layout: bpy.types.UILayout, name: str, value: str, *, active: bool =
     split.active = active
     right = split.row()
     right.alignment = "RIGHT"
-    right.label(text=name)
+    right.label(text=name, text_ctxt=CONTEXT)
     split.label(text=value)
 
 

@@ -14,6 +14,7 @@ from . import light_materials, viewport
 from .checklist import Problem
 from .colour_storage import Storage
 from .planning import settings_changed
+from .translations import CONTEXT
 
 LAYER_ITEMS = [
     ("combined", "Combined", "Emitted plus reflected light: what the surface looks like"),
@@ -115,6 +116,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         name="Tessellation",
         description="How finely the objects are split, so that their vertices can hold shadows",
         items=DENSITY_ITEMS,
+        translation_context=CONTEXT,
         default="TRIANGLES",
         update=settings_changed,
     )
@@ -165,6 +167,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         description="Kinds of light to store in colour attributes of their own (hold Shift to choose several). "
         "Combined is always among them",
         items=LAYER_ITEMS,
+        translation_context=CONTEXT,
         options={"ENUM_FLAG"},
         default={"combined"},
     )
@@ -211,6 +214,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         name="Layer",
         description="The layer that the viewport shows on the baked objects",
         items=LAYER_ITEMS,
+        translation_context=CONTEXT,
         default="combined",
         update=_show_layer,
     )

@@ -10,8 +10,10 @@ from bpy.app.translations import pgettext_iface as tr
 
 from .german import SENTENCES, WORDS
 
+#: For words that Blender itself has translated, and as something else.
+CONTEXT = "Radiosity"
 #: Blender looks the names of operators up in a context of their own.
-_CONTEXTS = ("*", "Operator")
+_CONTEXTS = ("*", "Operator", CONTEXT)
 #: Fields that are filled with words to be translated as well; others with names and numbers.
 _TOLD = {"what", "remedy"}
 _NUMBER = r"[\d.,]+"

@@ -53,7 +53,7 @@ def words(root):
         "Sampling",
         "Resolution",
     }
-    found |= {"sampling", "transport", "resolution"} | {name.capitalize() for name in EFFECTS}
+    found |= {"sampling", "transport", "resolution"} | set(EFFECTS)
     return found - {""}
 
 
