@@ -14,6 +14,9 @@ PRESETS = {
     "preview": ("Good enough to judge the light by", {"goal": "ERROR", "error": 5.0, "triangles": 25_000}),
     "production": ("For keeps: fine and 1 % off", {"goal": "ERROR", "error": 1.0, "triangles": 200_000}),
 }
+#: What a preset of one's own keeps.
+KEPT = ("goal", "error", "seconds", "result", "density", "triangles", "size", "layers", "estimator")
+KEPT += ("attribute", "domain", "data_type", "exposure")
 FOLDER = "radiosity_baker"
 
 
@@ -31,10 +34,7 @@ class RADIOSITY_OT_add_preset(AddPresetBase, bpy.types.Operator):
     preset_menu = "RADIOSITY_MT_presets"
     preset_subdir = FOLDER
     preset_defines: ClassVar[list[str]] = ["asked = bpy.context.scene.radiosity_baker"]
-    preset_values: ClassVar[list[str]] = [
-        f"asked.{name}"
-        for name in ("goal", "error", "seconds", "result", "density", "triangles", "size", "layers", "estimator")
-    ]
+    preset_values: ClassVar[list[str]] = [f"asked.{name}" for name in KEPT]
 
 
 class RADIOSITY_OT_choose_preset(bpy.types.Operator):
