@@ -471,6 +471,22 @@ def ask_for_a_moment():
     settings().triangles, settings().goal, settings().seconds = 1_000, "SECONDS", 2.0
 
 
+def save_meanwhile():
+    """A file that is saved during a bake is that of before it, and the bake goes on."""
+    before = content()
+    ask_for_a_moment()
+    yield from bake_by_click()
+    yield from first_light()
+    bpy.ops.wm.save_as_mainfile(filepath=str(DESK / "saved.blend"), copy=True)
+    yield from until(lambda: not running(), 300, "the end of the bake after saving")
+    assert content() != before
+    bpy.ops.wm.open_mainfile(filepath=str(DESK / "saved.blend"), load_ui=False)
+    yield 1.0
+    assert content() == before, "saving during a bake saved more than there was"
+    assert settings().last_report() is None
+    yield from open_tab()
+
+
 def edit_meanwhile():
     """A bake that ends in Edit Mode waits for Object Mode before it writes."""
     before = content()
@@ -532,6 +548,7 @@ def day():
     yield from be_a_new_user()
     yield from speak_german()
     yield from load_a_file_meanwhile()
+    yield from save_meanwhile()
     yield from edit_meanwhile()
     yield from delete_meanwhile()
     yield from disable_meanwhile()
