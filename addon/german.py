@@ -14,7 +14,7 @@ WORDS = {
     "Clear": "Entfernen",
     "Nothing stands in the way": "Nichts steht im Weg",
     "Not Simulated": "Nicht simuliert",
-    "The scene has changed since": "Die Szene hat sich seitdem geändert",
+    "Changed since: check again": "Seitdem geändert: erneut prüfen",
     "Bake Radiosity": "Radiosity backen",
     "Cancel Bake": "Backen abbrechen",
     "Stop and Keep": "Anhalten und behalten",

@@ -136,7 +136,7 @@ class PlanSection:
         plan = settings.last_plan()
         layout.operator("object.radiosity_plan", icon="VIEWZOOM")
         if settings.plan and Following.behind:
-            _label(layout.column(align=True), context, tr("The scene has changed since"), icon="FILE_REFRESH")
+            _label(layout.column(align=True), context, tr("Changed since: check again"), icon="FILE_REFRESH")
         for number, problem in enumerate(settings.problems()):
             column = layout.box().column(align=True)
             _label(column, context, problem.text, icon="ERROR")

@@ -59,22 +59,8 @@ def make(context: bpy.types.Context) -> None:
     Raises SceneError where there is nothing to bake.
     """
     Following.forget()
-    look = _read(context)
+    look = _look_at_scene(context)
     _tell(context.scene, look, weigh(look))
-
-
-def _read(context: bpy.types.Context) -> Look:
-    """Raises SceneError where there is nothing to bake."""
-    begun = perf_counter()
-    Following.reading = True
-    try:
-        look = read(context)
-        # What reading has switched on and off again must not count as an edit.
-        context.view_layer.update()
-    finally:
-        Following.reading = False
-    Following.seconds, Following.selected = perf_counter() - begun, _selected(context)
-    return look
 
 
 def read(context: bpy.types.Context) -> Look:
@@ -90,6 +76,20 @@ def read(context: bpy.types.Context) -> Look:
     except scene_reader.NoLightError:
         return Look(settings, mode, [*problems, checklist.no_light()], None)
     return Look(settings, mode, problems, scene)
+
+
+def _look_at_scene(context: bpy.types.Context) -> Look:
+    """Read it, and remember how long that took and what was selected. Raises SceneError as `read`."""
+    begun = perf_counter()
+    Following.reading = True
+    try:
+        look = read(context)
+        # What reading has switched on and off again must not count as an edit.
+        context.view_layer.update()
+    finally:
+        Following.reading = False
+    Following.seconds, Following.selected = perf_counter() - begun, _selected(context)
+    return look
 
 
 def weigh(look: Look) -> Verdict | None:
@@ -162,7 +162,7 @@ class Following:
             cls.edited, cls._pending = False, None
             cls.behind = cls.seconds > _READING_SECONDS
             if not cls.behind:
-                look = _read(context)
+                look = _look_at_scene(context)
                 cls._thread = cls._thread or ThreadPoolExecutor(1, "radiosity plan")
                 cls._pending = context.scene.session_uid, look, cls._thread.submit(weigh, look)
         if cls._pending is None:
@@ -213,7 +213,7 @@ def _file_changed(*_: object) -> None:
 
 
 def _selected(context: bpy.types.Context) -> frozenset[str]:
-    return frozenset(obj.name for obj in context.view_layer.objects.selected)
+    return frozenset(obj.name for obj in context.view_layer.objects.selected if obj.type == "MESH")
 
 
 def register() -> None:

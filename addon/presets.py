@@ -62,7 +62,16 @@ class _Presets(PresetPanel):
         for preset in PRESETS:
             column.operator("radiosity.choose_preset", text=preset.capitalize()).preset = preset
         self.layout.separator()
-        super().draw(context)
+        if bpy.utils.preset_paths(FOLDER):
+            super().draw(context)
+        else:
+            self._draw_first(context.window_manager)
+
+    def _draw_first(self, manager: bpy.types.WindowManager) -> None:
+        """As Blender draws it below presets; where there are none yet it complains of missing paths."""
+        row = self.layout.row()
+        row.prop(manager, "preset_name", text="")
+        row.operator(self.preset_add_operator, text="", icon="ADD").name = manager.preset_name
 
 
 class VIEW3D_PT_radiosity_presets(_Presets, bpy.types.Panel):
