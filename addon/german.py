@@ -398,6 +398,8 @@ SENTENCES |= {
     "is glass of roughness {number}: light goes straight through it in the bake, and is not scattered. For frosted "
     "glass mix in a Translucent BSDF.": "ist Glas der Rauheit {number}: Licht geht beim Backen gerade hindurch und "
     "wird nicht gestreut. Für Milchglas einen Translucent BSDF beimischen.",
+    "is not the same from behind: its front is used for both sides.": "ist von hinten anders: für beide Seiten gilt "
+    "die Vorderseite.",
     "reflects more than it receives; its colour is limited to {number}. Lower the base "
     "colour.": "reflektiert mehr, als es bekommt; seine Farbe wird auf {number} begrenzt. Die Grundfarbe senken.",
     "Material '{name}' reflects all light or more; {share} is used. Nothing real is whiter than fresh snow at 90 %: "

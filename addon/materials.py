@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Literal
 
 import bpy
@@ -79,6 +79,7 @@ def read_material(
         return MaterialSurface(material.name, albedo=_rgb(np.array(material.diffuse_color[:3]))), []
     reader = _TreeReader(f"Material '{material.name}'", object_color)
     shading = reader.output(tree)
+    one_sided = reader.tells_sides and _emits_in_front_only(reader, shading, tree)
     even = shading.albedo.ndim == 1 and shading.color_attribute is None and not reader.unread
     if even and shading.albedo.max() > ALBEDO_LIMIT:
         reader.warn(f"reflects more than it receives; its colour is limited to {ALBEDO_LIMIT}. Lower the base colour.")
@@ -108,8 +109,24 @@ def read_material(
         color_attribute=None if reader.unread else shading.color_attribute,
         unread=tuple(reader.unread),
         by_object=reader.by_object,
+        one_sided=one_sided,
     )
     return surface, reader.warnings
+
+
+def _emits_in_front_only(reader: _TreeReader, front: _Shading, tree: bpy.types.NodeTree) -> bool:
+    """Whether the back of a material that tells its sides apart emits nothing, but the front does. Warns where they
+    differ by more or by something else."""
+    back = _TreeReader(reader.owner, reader.object_color, side=1.0).output(tree)
+    dark = bool(front.emission.any() and not back.emission.any())
+    if not _same(replace(back, emission=front.emission) if dark else back, front):
+        reader.warn("is not the same from behind: its front is used for both sides.")
+    return dark
+
+
+def _same(one: _Shading, other: _Shading) -> bool:
+    pairs = ((getattr(one, f.name), getattr(other, f.name)) for f in fields(_Shading))
+    return all(np.array_equal(a, b) for a, b in pairs)
 
 
 def read_constant_background(world: bpy.types.World) -> tuple[RGB, list[str]]:
@@ -153,11 +170,14 @@ class _TreeReader:
     """Follows the links of one node tree from its output; collects warnings that begin with the owner's name.
 
     object_color: of the object whose faces the tree shades; None for lamps and worlds, over which nothing varies.
-    placement: of the images found so far, all alike. unread: the warnings of what only Cycles can read.
+    side: that is looked at, 0 the front and 1 the back; tells_sides: whether it matters. placement: of the images found
+    so far, all alike. unread: the warnings of what only Cycles can read.
     """
 
-    def __init__(self, owner: str, object_color: Sequence[float] | None = None) -> None:
+    def __init__(self, owner: str, object_color: Sequence[float] | None = None, side: float = 0.0) -> None:
         self.owner = owner
+        self.side = side
+        self.tells_sides = False
         self.object_color = None if object_color is None else np.array(object_color[:3], np.float64)
         self.warnings: list[str] = []
         self.unread: list[str] = []
@@ -500,6 +520,13 @@ def _constant(_: _TreeReader, node: bpy.types.Node, output: bpy.types.NodeSocket
     return _plain(output)
 
 
+def _geometry(reader: _TreeReader, _: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
+    if output.name != "Backfacing":
+        raise Unreadable
+    reader.tells_sides = True
+    return np.array([reader.side])
+
+
 def _object_info(reader: _TreeReader, _: bpy.types.Node, output: bpy.types.NodeSocket) -> Float64:
     if output.name != "Color" or reader.object_color is None:
         raise Unreadable
@@ -620,6 +647,7 @@ VALUES: dict[str, Callable[[_TreeReader, bpy.types.Node, bpy.types.NodeSocket], 
     "ShaderNodeRGB": _constant,
     "ShaderNodeValue": _constant,
     "ShaderNodeObjectInfo": _object_info,
+    "ShaderNodeNewGeometry": _geometry,
     "ShaderNodeTexImage": _image,
     "ShaderNodeMix": _mix_colours,
     "ShaderNodeMixRGB": _mix_colours,

@@ -196,7 +196,7 @@ def bounces(scene: Scene, settings: Settings) -> Effect:
     little = asked_error(settings) / 10.0
     if albedo <= 0:
         return Effect("bounces", False, "every surface is black")
-    if albedo / (1.0 - albedo) < little and not goes_on(scene):
+    if albedo < little * (1.0 - albedo) and not goes_on(scene):
         return Effect("bounces", False, f"surfaces reflect {albedo:.2%} at most: no bounce would show")
     if settings.estimator == "centroid":
         return Effect("bounces", True, "as the original program did: centroid form factors, plain shooting")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .optics import Optics, make_optics, stopping_share
-from .scene import Float32, Float64, Int32, Scene, SceneObject
+from .scene import Bool, Float32, Float64, Int32, Scene, SceneObject
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
 from .textures import Colours, constant_colours, even_points, mean_colours, varies
 
@@ -64,7 +64,7 @@ class Patches:
     patch, from first (p + 1,) on. patch_area (p,), surface (p,) into Scene.surfaces, albedo (p, 3), emission (p, 3)
     radiance W/(m^2 sr). transmission (p, 3): share that leaves on the other side, None if nothing transmits. optics:
     where rays go on, None if nowhere; then a patch's light is that of the share of it where rays stop: coverage (p,),
-    None if that is all of it.
+    None if that is all of it. one_sided (p,): patches whose back emits nothing; None if there are none.
     """
 
     space: Space
@@ -82,6 +82,16 @@ class Patches:
     transmission: Float32 | None = None
     optics: Optics | None = None
     coverage: Float64 | None = None
+    one_sided: Bool | None = None
+
+    def emission_of(self, side: Int32) -> Float32:
+        """Radiance (..., 3) that sides emit: patch numbers (...) for fronts, those plus the number of patches for
+        backs."""
+        patch = side % len(self)
+        if self.one_sided is None:
+            return self.emission[patch]
+        dark = self.one_sided[patch] & (side >= len(self))
+        return np.where(dark[..., None], np.float32(0.0), self.emission[patch])
 
     def __len__(self) -> int:
         return len(self.patch_area)
@@ -154,6 +164,7 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
         colours = _mean_colours(scene, split, solid, patch, area[solid] / patch_area[patch])
     coverage = np.array([s.opacity * stopping_share(s) for s in scene.surfaces])[patch_surface]
     front = np.array([s.front_share for s in scene.surfaces])[patch_surface]
+    one_sided = np.array([s.one_sided and max(s.emission) > 0 for s in scene.surfaces])[patch_surface]
     diffuse = colours.albedo / np.maximum(coverage, 1e-12)[:, None]
     shadowless = np.concatenate(
         [np.full(len(m.triangles), not o.casts_shadow) for o, m in zip(scene.objects, split.meshes, strict=True)]
@@ -186,6 +197,7 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
         transmission=(diffuse * (1.0 - front)).astype(np.float32) if (front < 1.0).any() else None,
         optics=optics,
         coverage=None if optics is None else coverage * filled,
+        one_sided=one_sided if one_sided.any() else None,
     )
 
 

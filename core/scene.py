@@ -66,14 +66,14 @@ def _halved(pixels: Float32) -> Float32:
 
 @dataclass(frozen=True)
 class Surface:
-    """A material. Both sides are alike, as in Cycles.
+    """A material. Both sides are alike, as in Cycles, but that emission may be of the front alone.
 
     opacity: share of the light that meets the material at all, 0 to 1; the rest goes straight through, tinted by
     `transparent`. Its texture cuts holes: it multiplies what rays find, but not what is baked, which is the light of
     what is there. All else is of the opaque part: shares per channel that are reflected diffusely (albedo), leave
     diffusely on the other side (transmission), are mirrored (mirror), or meet clear glass (glass), which mirrors a
     little and lets the rest straight through. emission: emitted radiance per channel, W/(m^2 sr). A texture
-    multiplies albedo and transmission, or emission, point by point. ior: index of
+    multiplies albedo and transmission, or emission, point by point. one_sided: the back emits nothing. ior: index of
     refraction of the glass, 1 mirrors nothing. roughness of the mirror, 0 to 1, as in Blender.
     """
 
@@ -90,6 +90,7 @@ class Surface:
     ior: float = 1.0
     roughness: float = 0.0
     opacity_texture: Texture | None = None
+    one_sided: bool = False
 
     @property
     def scattered(self) -> RGB:

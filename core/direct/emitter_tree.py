@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..patches import triangle_geometry
-from ..scene import Float32, Float64
+from ..scene import Bool, Float32, Float64
 from .solid_angle import triangle_directions
 
 #: Cosines at the receiver and at the emitter are taken for at least this: no triangle that may shine has no chance.
@@ -33,15 +33,17 @@ class Shots:
 
 
 class EmitterTree:
-    """corners (t, 3, 3) in the unit box, radiance (t, 3) of triangles that shine from both sides."""
+    """corners (t, 3, 3) in the unit box, radiance (t, 3) of triangles; one_sided (t,): those that shine from their
+    front alone, None for none."""
 
-    def __init__(self, corners: Float64, radiance: Float64) -> None:
+    def __init__(self, corners: Float64, radiance: Float64, one_sided: Bool | None = None) -> None:
         normals, area = triangle_geometry(corners)
         center = corners.mean(axis=1)
         order, cuts = _halve(center)
         corners, normals, area, center, radiance = (a[order] for a in (corners, normals, area, center, radiance))
         self._corners = np.ascontiguousarray(corners.transpose(1, 2, 0))
         self._normals, self._area = normals.T.copy(), area
+        self._one_sided = None if one_sided is None or not one_sided.any() else one_sided[order]
         self._color = (np.pi * radiance.T).astype(np.float32)
         power = area * radiance.mean(axis=1)
         spread = ((corners - center[:, None]) ** 2).sum(axis=(1, 2)) / 12 + (center**2).sum(axis=1)
@@ -74,6 +76,9 @@ class EmitterTree:
             squared[large] = (towards[:, *large] ** 2).sum(axis=0)
             solid[large] = angle[usable]
         cosine = np.maximum((towards * shading[:, None]).sum(axis=0), 0) / np.sqrt(squared)
+        if self._one_sided is not None:
+            behind = (towards * self._normals[:, triangle]).sum(axis=0) > 0
+            solid[self._one_sided[triangle] & behind] = 0.0
         brings = self._color[:, triangle] * (cosine * solid / (np.pi * chance)).astype(np.float32)
         return Shots(towards.astype(np.float32), brings)
 

@@ -1,4 +1,4 @@
-"""Emitting surfaces as lamps: each triangle a panel that shines from both sides.
+"""Emitting surfaces as lamps: each triangle a panel that shines from both sides, or from its front.
 
 A panel shines alike all over. A triangle whose emission is textured is split, where that varies most, into smaller
 panels of the mean emission each: detail finer than that shows only nearer to the surface than a panel is wide.
@@ -27,7 +27,8 @@ _MOST_PIECES, _EVEN = 32, 0.05
 @dataclass(frozen=True, eq=False)
 class Piece:
     """Part of an emitting triangle: name of its surface, weights (3, 3) of the triangle's corners at its own, corners
-    (3, 3) and area in metres, radiance (3,) W/(m^2 sr). uneven: the radiance's standard deviation within it."""
+    (3, 3) and area in metres, radiance (3,) W/(m^2 sr), of both sides or of the front. uneven: the radiance's standard
+    deviation within it."""
 
     name: str
     scene_object: SceneObject
@@ -36,6 +37,7 @@ class Piece:
     corners: Float64
     area: float
     radiance: Float64
+    two_sided: bool
     uneven: float
 
 
@@ -48,18 +50,20 @@ def emitting_panels(scene: Scene, space: Space) -> list[Source]:
     placed = [(piece, space.normalise(piece.corners)) for piece in emitting_pieces(scene)]
     # What rounding gives an area far from the origin may have none at home.
     solid = [(piece, corners) for piece, corners in placed if triangle_geometry(corners[None])[1][0] > 0]
-    return [Panel(piece.name, corners, piece.radiance, two_sided=True) for piece, corners in solid]
+    return [Panel(piece.name, corners, piece.radiance, two_sided=piece.two_sided) for piece, corners in solid]
 
 
 def _tree(scene: Scene, space: Space) -> EmitterTree:
-    corners, radiance = [], []
+    corners, radiance, one_sided = [], [], []
+    of_surfaces = np.array([surface.one_sided for surface in scene.surfaces])
     for scene_object in scene.objects:
         emission = triangle_emission(scene, scene_object)
         own = space.normalise(scene_object.vertices[scene_object.triangles])
         emits = (emission.max(axis=1) > 0) & (triangle_geometry(own)[1] > 0)
         corners.append(own[emits])
         radiance.append(emission[emits])
-    return EmitterTree(np.concatenate(corners), np.concatenate(radiance))
+        one_sided.append(of_surfaces[scene_object.surface[emits]])
+    return EmitterTree(np.concatenate(corners), np.concatenate(radiance), np.concatenate(one_sided))
 
 
 def emitting_pieces(scene: Scene) -> list[Piece]:
@@ -100,5 +104,6 @@ def _piece(scene: Scene, scene_object: SceneObject, triangle: int, weights: Floa
         corners,
         float(triangle_geometry(corners[None])[1][0]),
         radiance.mean(axis=0),
+        not surface.one_sided,
         float(radiance.mean(axis=1).std()),
     )

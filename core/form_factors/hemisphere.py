@@ -64,7 +64,7 @@ class Sides:
 
     @property
     def emission(self) -> Float32:
-        return self.patches.emission[self.patch]
+        return self.patches.emission_of(self.side)
 
     def transmitted(self, irradiance: Float64) -> Float64:
         """Radiosity (s, 3) from irradiance (s, 3) on the other side of each patch; 0 if nothing transmits."""
@@ -219,7 +219,7 @@ def _look_around(
         if glows and looks.mirrored is not None:
             seen = looks.mirrored.reshape(columns.shape) & (columns < codes.lost)
             ray = np.flatnonzero(seen)
-            radiance = patches.emission[columns.reshape(-1)[ray] % len(patches)]
+            radiance = patches.emission_of(columns.reshape(-1)[ray])
             shown = radiance if tint is None else radiance * tint.reshape(-1, 3)[ray]
             np.add.at(glints, ray // columns.shape[1], shown)
         texel = met.reshape(len(met), -1) - codes.escaped

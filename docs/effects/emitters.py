@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...sample_blends.modelling import add_mesh, box, emission, join, sphere, tube
+from ...sample_blends.modelling import add_mesh, box, emission, join, polygons, sphere, tube
 from .catalogue import effect_scene
 from .lamps import stage
 
@@ -48,3 +48,21 @@ def neon_tube() -> None:
     t = np.linspace(0.0, 2.0, 60)
     line = np.column_stack([1.5 * t - 1.5, -0.8 + 0.3 * np.sin(4.0 * t), 1.2 + 0.3 * np.cos(5.0 * t)])
     add_mesh("Neon", tube(line, 0.015, emission("Neon", (120.0, 20.0, 60.0))))
+
+
+@effect_scene("emitting surfaces", receivers=RECEIVERS)
+def panel_that_shines_from_its_front_alone() -> None:
+    """Before the wall and turned away from it: the node Geometry tells its back, which is black."""
+    stage()
+    glow = emission("Glow", (20.0, 16.0, 12.0))
+    tree = glow.node_tree
+    mix, geometry = tree.nodes.new("ShaderNodeMixShader"), tree.nodes.new("ShaderNodeNewGeometry")
+    black = tree.nodes.new("ShaderNodeBsdfDiffuse")
+    black.inputs["Color"].default_value = (0.0, 0.0, 0.0, 1.0)
+    output = tree.get_output_node("ALL").inputs["Surface"]
+    tree.links.new(geometry.outputs["Backfacing"], mix.inputs[0])
+    tree.links.new(output.links[0].from_socket, mix.inputs[1])
+    tree.links.new(black.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], output)
+    corners = [(-0.6, 0.0, 0.0), (0.6, 0.0, 0.0), (0.6, 0.0, 0.8), (-0.6, 0.0, 0.8)]
+    add_mesh("Panel", polygons(corners, [(0, 1, 2, 3)], glow), at=(0.2, 1.2, 0.9))

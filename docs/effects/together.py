@@ -18,8 +18,8 @@ from .textures import image, pictured, unwrap
 from .transparency import STAGE, canopy, made_of, screen, stage
 
 #: A size and no error asked: as many triangles and passes in every scene, so that only the effects differ.
-SETTINGS = Settings(size=0.12, error=None, threads=1)
-_TIMES = 3
+SETTINGS = Settings(size=0.25, triangles=2_000, error=None, threads=1)
+_TIMES = 2
 
 
 def _sun() -> None:
@@ -116,5 +116,5 @@ def table() -> Iterator[str]:
         alone = cost([name]) - nothing
         together = cost(names[: number + 1])
         added += alone
-        cells = [f"+{alone.seconds:.2f}", f"+{alone.rays / 1e6:.2f}", f"{together.seconds:.2f}", f"{added.seconds:.2f}"]
+        cells = [f"{alone.seconds:+.2f}", f"{alone.rays / 1e6:+.2f}", f"{together.seconds:.2f}", f"{added.seconds:.2f}"]
         yield f"| {name} | {' | '.join(cells)} | {together.rays / 1e6:.2f} | {added.rays / 1e6:.2f} |"

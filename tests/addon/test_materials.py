@@ -256,3 +256,33 @@ def test_rough_albedo_keeps_its_ends():
     np.testing.assert_array_equal(rough_albedo(colour, 0.0), colour)
     # Energy is preserved: a white surface stays white however rough.
     np.testing.assert_allclose(rough_albedo(colour, 1.0)[[0, 2]], [0.0, 1.0], atol=1e-12)
+
+
+def turned_by_side(add_material, behind="ShaderNodeBsdfDiffuse", **inputs):
+    """A lamp's front, and another shader behind."""
+    material = add_material("ShaderNodeEmission", name="Panel", Color=LIGHT, Strength=3.0)
+    tree = material.node_tree
+    mix, geometry, back = (tree.nodes.new(kind) for kind in ("ShaderNodeMixShader", "ShaderNodeNewGeometry", behind))
+    for name, value in inputs.items():
+        back.inputs[name].default_value = value
+    front = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeEmission")
+    tree.links.new(geometry.outputs["Backfacing"], mix.inputs[0])
+    tree.links.new(front.outputs[0], mix.inputs[1])
+    tree.links.new(back.outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    return material
+
+
+def test_what_emits_in_front_only_is_one_sided(add_material):
+    surface, warnings = read_material(turned_by_side(add_material, Color=(0.0, 0.0, 0.0, 1.0)))
+    np.testing.assert_allclose(surface.emission, 3.0 * np.array(LIGHT[:3]))
+    assert (surface.one_sided, surface.unread, warnings) == (True, (), [])
+
+
+def test_a_back_of_another_colour_is_warned_of(add_material):
+    surface, warnings = read_material(turned_by_side(add_material, Color=COLOUR))
+    assert surface.one_sided
+    assert warnings == ["Material 'Panel' is not the same from behind: its front is used for both sides."]
+    both, warnings = read_material(turned_by_side(add_material, "ShaderNodeEmission", Strength=1.0))
+    assert not both.one_sided
+    assert len(warnings) == 1

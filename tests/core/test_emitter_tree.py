@@ -9,8 +9,8 @@ from radiosity_baker.core.direct.emitter_tree import EmitterTree
 from radiosity_baker.core.direct.emitters import emitting_panels
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.form_factors.polygon import polygon_irradiance
-from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.scene import Scene, Surface
+from radiosity_baker.core.patches import Space, unit_space
+from radiosity_baker.core.scene import Scene, SceneObject, Surface
 from radiosity_baker.core.visibility import Visibility
 
 TRIES = 4000
@@ -91,3 +91,29 @@ def test_many_small_bulbs_become_one_tree_and_a_glowing_room_is_left_to_the_rays
     assert isinstance(tree, EmitterTree)
     room = Scene((build.sphere(level=3, surface=1),), (build.grey, glow))
     assert emitting_panels(room, unit_space(room)) == []
+
+
+@pytest.mark.parametrize("cells", [2, 9], ids=["panels", "tree"])
+def test_one_sided_emitters_light_what_is_before_them_as_two_sided_ones_do_and_nothing_behind(build, cells):
+    """The plate faces down: before it exactly the same, with the same random numbers; behind it nothing. What does not
+    emit is much larger, or rays would find the plate."""
+    triangles = plate(0.0, cells)
+    sheet = SceneObject(
+        "plate",
+        triangles.reshape(-1, 3),
+        np.arange(triangles[..., 0].size).reshape(-1, 3),
+        np.zeros(len(triangles), int),
+    )
+    below, above = np.array([0.1, 0.2, -0.5]), np.array([0.1, 0.2, 0.5])
+
+    def irradiance(point, normal, *, one_sided):
+        glow = Surface("glow", (0, 0, 0), (1.0, 1.0, 1.0), one_sided=one_sided)
+        scene = Scene((sheet, build.quad("far", (-5, -5, -9), (10, 0, 0), (0, 10, 0), 1)), (glow, build.grey))
+        light = DirectLight(emitting_panels(scene, Space(np.zeros(3), 1.0)), Visibility(triangles), 0)
+        return light.at(point[None], normal[None], normal[None], 4, np.random.default_rng(5)).irradiance
+
+    before = irradiance(below, NORMAL, one_sided=True)
+    assert before.min() > 0
+    assert np.array_equal(before, irradiance(below, NORMAL, one_sided=False))
+    assert irradiance(above, -NORMAL, one_sided=True).max() == 0
+    assert irradiance(above, -NORMAL, one_sided=False).min() > 0

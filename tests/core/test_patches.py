@@ -151,3 +151,15 @@ def test_a_shading_normal_on_the_back_gives_way_to_the_geometry():
     receiver = smooth([(0, 0, -1), (0, 0, 0), (0, 0, 1)])
     shaded = shading_normals(receiver, np.zeros(1, np.int32), np.eye(3)[None], np.array([[0.0, 0, 1]]))
     assert shaded[0].tolist() == [[0, 0, 1]] * 3
+
+
+def test_one_sided_patches_emit_in_front_alone(build):
+    glow, lamp = Surface("glow", emission=(1, 2, 3)), Surface("lamp", emission=(4, 5, 6), one_sided=True)
+    scene = Scene((build.quad("a"), build.quad("b", (0, 0, 1), surface=1)), (glow, lamp))
+    patches = build.patches(scene, 4)
+    count = len(patches)
+    every = np.arange(2 * count, dtype=np.int32)
+    own = np.array([(1, 2, 3), (4, 5, 6)])[patches.surface]
+    behind = own * (patches.surface == 0)[:, None]
+    assert np.array_equal(patches.emission_of(every), np.concatenate([own, behind]))
+    assert build.patches(Scene(scene.objects, (glow, glow)), 4).one_sided is None
