@@ -260,7 +260,8 @@ def _figure(layout: bpy.types.UILayout, name: str, value: str, *, active: bool =
 def _label(layout: bpy.types.UILayout, context: bpy.types.Context, text: str, icon: str = "NONE") -> None:
     """A text over as many lines as the region's width calls for; Blender's own labels cut it off."""
     width = context.region.width / context.preferences.system.ui_scale - MARGIN
-    for line in textwrap.wrap(told(text), max(20, int(width / PIXELS_PER_LETTER))):
+    whole = told(text).replace(" %", "\N{NO-BREAK SPACE}%")
+    for line in textwrap.wrap(whole, max(20, int(width / PIXELS_PER_LETTER))):
         layout.label(text=line, icon=icon)
         icon = "NONE" if icon == "NONE" else "BLANK1"
 

@@ -77,6 +77,7 @@ class RadiosityBakerSettings(bpy.types.PropertyGroup):
         name="Bake for",
         description="What ends the bake: an accuracy that is reached, or a time that is up",
         items=GOAL_ITEMS,
+        translation_context=CONTEXT,
         default="ERROR",
         update=settings_changed,
     )

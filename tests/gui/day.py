@@ -468,6 +468,8 @@ def load_a_file_meanwhile():
 
 
 def ask_for_a_moment():
+    """And for other random numbers than last time: what is remembered would be there at once."""
+    settings().seed += 1
     settings().triangles, settings().goal, settings().seconds = 1_000, "SECONDS", 2.0
 
 
