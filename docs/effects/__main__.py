@@ -16,8 +16,9 @@ _TOGETHER = """\
 ## What effects cost together
 
 One stage under a lamp, to which one thing after the other is added, with as many triangles and passes each time: what
-each costs alone, and what all down to its row cost, beside the sum of what the parts cost alone.
-
+each costs alone, and what all down to its row cost, beside the sum of what the parts cost alone. No thing slows down
+what has nothing to do with it; but a veil is asked by the rays to every lamp that it hangs before, so with more lamps
+it costs more than alone.
 """
 _HEAD = "| Scene | Simulated | Typical error | Noise of reference | Bias | Processor seconds | Million rays | |"
 _RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
@@ -26,7 +27,8 @@ _RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
 def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measured], costs: Sequence[str] = ()) -> str:
     """The document with the rows of the measured scenes renewed, kind by kind, and the table of costs if it is given;
     the words before the tables stay."""
-    text, _, old_costs = text.partition(_TOGETHER)
+    text, _, old = text.partition(_TOGETHER.partition("\n")[0])
+    costs = costs or [line for line in old.splitlines() if line.startswith("|")]
     rows = {line.split(" | ")[0].removeprefix("| "): line for line in text.splitlines() if line.startswith("| ")}
     rows |= {one.scene.name: f"| {' | '.join(_cells(one))} |" for one in measured}
     rows = {name: rows[name] for name in scenes if name in rows}
@@ -36,8 +38,9 @@ def document(text: str, scenes: dict[str, EffectScene], measured: Sequence[Measu
     for kind in dict.fromkeys(scenes[name].kind for name in rows):
         own = [row for name, row in rows.items() if scenes[name].kind == kind]
         parts.append("\n".join([f"## {kind.replace('_', ' ').capitalize()}\n", _HEAD, _RULE, *own]))
-    table = "\n".join(costs) or old_costs.strip()
-    return "\n\n".join([*parts, *([_TOGETHER + table] if table else [])]) + "\n"
+    if costs:
+        parts += [_TOGETHER.rstrip(), "\n".join(costs)]
+    return "\n\n".join(parts) + "\n"
 
 
 def _cells(one: Measured) -> list[str]:
