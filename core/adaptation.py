@@ -8,6 +8,7 @@ matters or there are as many as allowed.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -133,12 +134,17 @@ class Adaptation:
                 total = arriving[:, :-1] @ self._around.to_grey + direct[near_contact]
                 if number == 0:
                     self._mean = float(total.mean())
+                look = partial(self._seen, self._around, 100_000_000 + streams)
                 hidden[near_contact] = out_of_sight(
-                    some, self._around.hemispheres, enclosed, total, direct[near_contact], self._mean
+                    some, self._around, enclosed, total, direct[near_contact], self._mean, look
                 )
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
+
+    def _seen(self, around: Surroundings, number: int, points: Points) -> Float64:
+        """Mean irradiance (n,) of what is seen from the points."""
+        return gather_indirect(points, around.hemispheres, around.lit, self._seed, number, self._workers)[0][:, 0]
 
 
 def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:

@@ -47,13 +47,19 @@ class Points:
         """Numbers of the points where light that arrives on the back counts too."""
         return np.flatnonzero((self.front < 1).any(axis=1)) if self.front is not None else np.empty(0, dtype=np.int64)
 
+    def only(self, chosen: np.ndarray) -> Points:
+        """Some of the points, as seen from their fronts alone."""
+        some = copy(self)
+        some.front = None
+        some.weights, some.barycentric = self.weights[chosen], self.barycentric[chosen]
+        some.positions, some.size = self.positions[chosen], self.size[chosen]
+        some.normals, some.shading = self.normals[chosen], self.shading[chosen]
+        return some
+
     def behind(self, chosen: np.ndarray) -> Points:
         """The same places on the back of the surface."""
-        turned = copy(self)
-        turned.front = None
-        turned.weights, turned.barycentric = self.weights[chosen], self.barycentric[chosen]
-        turned.positions, turned.size = self.positions[chosen], self.size[chosen]
-        turned.normals, turned.shading = -self.normals[chosen], -self.shading[chosen]
+        turned = self.only(chosen)
+        turned.normals, turned.shading = -turned.normals, -turned.shading
         return turned
 
     def share(self, chosen: np.ndarray, columns: int) -> Float64:

@@ -7,6 +7,7 @@ as one half of the transport rays solved them, odd passes as the other half did:
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +30,8 @@ from .visibility import Visibility
 #: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
 #: cell's size, one that gets less than half.
 _DARK, _DIM, _GAP = 0.05, 0.5, 0.25
+#: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
+_LIT = 0.25
 
 #: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
 #: sides, for what shows of it beside a straight outline has a corner.
@@ -43,6 +46,7 @@ class Surroundings:
     one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
+    lit (codes, 1): mean irradiance of what a ray meets, however dark its colour is.
     """
 
     hemispheres: Hemispheres
@@ -51,6 +55,7 @@ class Surroundings:
     sky: slice
     emitted: slice
     to_grey: Float64
+    lit: Float32
 
 
 def look_up(
@@ -76,7 +81,13 @@ def look_up(
         to_grey=np.concatenate(
             [np.full(channels, 1 / channels), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / channels)]
         ),
+        lit=_lit(halves[0], sky),
     )
+
+
+def _lit(half: Transport, sky: Sky) -> Float32:
+    met = half.by_code(half.solution.irradiance.mean(axis=1, keepdims=True))
+    return np.concatenate([met, np.zeros((len(sky.light), 1), dtype=np.float32)])
 
 
 def _table(half: Transport, sky: Sky, effort: Effort) -> Float32:
@@ -99,18 +110,29 @@ def _table(half: Transport, sky: Sky, effort: Effort) -> Float32:
 
 
 def out_of_sight(
-    points: Points, hemispheres: Hemispheres, enclosed: Bool, total: Float64, direct: Float64, mean: float
+    points: Points,
+    around: Surroundings,
+    enclosed: Bool,
+    total: Float64,
+    direct: Float64,
+    mean: float,
+    look: Callable[[Points], Float64],
 ) -> Bool:
     """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or in a gap that is
     much narrower than their cell, under what lies on the surface or nearly so.
 
     A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
-    reaches count. total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total.
+    reaches count, and from which nothing is seen that light reaches, for a shadow in a dark room is in sight.
+    total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total. look: the mean
+    irradiance (n,) of what is seen from some points.
     """
     hidden = enclosed & dark(total, direct, mean)
+    doubtful = np.flatnonzero(hidden)
+    if len(doubtful):
+        hidden[doubtful] = look(points.only(doubtful)) <= _LIT * mean
     dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
     if len(dim):
-        hidden[dim] = hemispheres.covered(points.positions[dim], points.normals[dim], _GAP * points.size[dim])
+        hidden[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], _GAP * points.size[dim])
     return np.asarray(hidden)
 
 
@@ -201,7 +223,15 @@ class Survey:
         direct = light.grey
         total = values @ around.to_grey + direct
         self._mean = float(total.mean())
-        valid = ~out_of_sight(points, around.hemispheres, enclosed, total, direct, self._mean)
+
+        def look(some: Points) -> Float64:
+            seen, _, _, cast = gather_indirect(
+                some, around.hemispheres, around.lit, self.seed, 4_000_000 + number, self.workers
+            )
+            self.rays += cast
+            return seen[:, 0]
+
+        valid = ~out_of_sight(points, around, enclosed, total, direct, self._mean, look)
         noise = (deviation[:, :columns] @ around.to_grey) ** 2
         self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
         return valid

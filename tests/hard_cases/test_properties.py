@@ -203,7 +203,7 @@ def layers_of(result) -> dict[str, np.ndarray]:
 def tries(count: int):
     """So many scenes in `make test`, always the same; many times as many, and new ones, with the profile `fuzz`."""
     fuzz = settings.get_current_profile_name() == "fuzz"
-    return settings(
+    asked = settings(
         max_examples=count * (FUZZ_FACTOR if fuzz else 1),
         derandomize=not fuzz,
         deadline=None,
@@ -211,6 +211,18 @@ def tries(count: int):
         database=None,
         phases=(Phase.generate, Phase.shrink) if fuzz else (Phase.generate,),
     )
+
+    def decorate(test):
+        test = asked(test)
+        test.scenes = asked.max_examples
+        return test
+
+    return decorate
+
+
+@pytest.fixture(autouse=True)
+def _told(request, record_property):
+    record_property("injected", f"{request.function.scenes} scenes")
 
 
 class Stages:
