@@ -111,27 +111,33 @@ class Escapes:
 
 def look_for_sky(pilot: Pilot) -> Escapes:
     """Rays from the receivers until enough have left, or it is clear that hardly any do."""
-    found: list[Look] = []
+    origins: list[Float32] = []
+    directions: list[Float32] = []
     left, escaped, within = 0, False, 0
     for number in range(_ROUNDS):
         rng = stream(0, "look for sky", number)
         look = pilot.look_around(*pilot.on_receivers(_POINTS, rng), _RAYS, rng)
         narrow = np.repeat(look.escaped.reshape(-1, _RAYS).mean(axis=1) <= _NARROW, _RAYS)
         kept = look.escaped & narrow & look.straight
-        found.append(Look(look.origins[kept], look.directions[kept], look.path))
+        origins.append(look.origins[kept])
+        directions.append(look.directions[kept])
         left += int(kept.sum())
         within += int(narrow.sum())
         escaped |= bool(look.escaped.any())
         if left >= _ENOUGH or (escaped and not left):
             break
-    origins, directions = (np.concatenate([getattr(f, name) for f in found]) for name in ("origins", "directions"))
     none = not escaped and not _wanders_out(pilot)
-    cast = len(found) * _POINTS * _RAYS
-    return Escapes(origins, directions, within / cast, left / max(within, 1), none, _SURE / cast)
+    cast = len(origins) * _POINTS * _RAYS
+    return Escapes(
+        np.concatenate(origins), np.concatenate(directions), within / cast, left / max(within, 1), none, _SURE / cast
+    )
 
 
 def _wanders_out(pilot: Pilot) -> bool:
-    """Whether some path of light from the receivers ends in the sky, after any number of turns."""
+    """Whether some path of light from the receivers ends in the sky, after any number of turns; for all that is known,
+    where light passes through walls."""
+    if pilot.patches.transmission is not None:
+        return True
     rng = stream(0, "wander")
     points, normals = pilot.on_receivers(_PATHS, rng)
     for _ in range(_TURNS):
@@ -139,6 +145,8 @@ def _wanders_out(pilot: Pilot) -> bool:
         if look.escaped.any():
             return True
         points, normals = pilot.where_hit(look.path, rng)
+        if not len(points):
+            break
     return False
 
 

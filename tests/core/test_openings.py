@@ -160,3 +160,17 @@ def test_a_sky_that_is_all_the_light_there_is_or_outshines_it_is_not_left_out(bu
     assert reason_for(closed(build, sky=(1e5, 1e5, 1e5)), "sky")[0]
     dim = AreaLamp("glow", (0, 0, 2.9), (0.1, 0, 0), (0, 0.1, 0), (0, 0, -1), (1e-3, 1e-3, 1e-3))
     assert reason_for(closed(build, lamps=(dim,)), "sky")[0]
+
+
+def test_a_tent_lets_the_sky_in_although_no_ray_gets_out(build):
+    """Its cloth passes light on from one side to the other."""
+    cloth = Surface("cloth", (0.3, 0.3, 0.3), transmission=(0.3, 0.3, 0.3))
+    assert reason_for(closed(build, surfaces=(cloth,)), "sky")[0]
+
+
+def test_where_nothing_comes_back_nothing_wanders_out(build):
+    """All rays are swallowed by veils without a colour, in one turn."""
+    veil = Surface("veil", opacity=0.0, transparent=(0.0, 0.0, 0.0))
+    inside = closed(build)
+    walls = tuple(o if o.receives else replace(o, surface=o.surface + 1) for o in inside.objects)
+    assert not reason_for(replace(inside, objects=walls, surfaces=(WHITE, veil)), "sky")[0]
