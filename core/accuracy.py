@@ -62,6 +62,8 @@ UNKNOWN = ErrorEstimate(np.inf, np.inf, np.inf)
 ALPHAS = (0.02, 0.5, 5.0, 50.0)
 #: Mean squared jump of the gradient over mean squared error, of the least smooth fit of a step and of a parabola.
 STEP_BEND, PARABOLA_BEND = 6.0, 70.0
+#: Relative error up to which the halves are fitted: they only tell errors that are larger.
+_ROUGH = 2e-3
 #: By what share of itself the samples' own noise may be misjudged: the two sets of rays that tell are not quite
 #: independent.
 _MISJUDGED = 0.01
@@ -83,7 +85,7 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
     tried: list[_Halves] = []
     start: list[Float64 | None] = [None, None]
     for alpha in ALPHAS:
-        values = [fit.solve(system, alpha, begin) for system, begin in zip(systems, start, strict=True)]
+        values = [fit.solve(system, alpha, begin, _ROUGH) for system, begin in zip(systems, start, strict=True)]
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
         low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
         first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)

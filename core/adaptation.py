@@ -7,6 +7,7 @@ matters or there are as many as allowed.
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -32,6 +33,8 @@ _BOUNDARY_STEP = 12.0
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
 #: lamp with size.
 _POINTS, _RAYS, _SHADOW_RAYS = 4, 8, 4
+#: About how many points tell the mean light.
+_MEAN_POINTS = 4096
 #: Standard deviations by which the largest and the smallest of some points must differ to mean a jump.
 _SIGNIFICANT = 4.0
 #: Numbers of streams that no pass of the survey uses.
@@ -64,7 +67,8 @@ class _Probe:
 
 
 class Adaptation:
-    """Splits triangles along the boundaries of light; without surroundings only shadows are looked for."""
+    """Splits triangles along the boundaries of light; without surroundings only shadows are looked for. rays: cast so
+    far, by purpose."""
 
     def __init__(self, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers) -> None:
         self._light = direct_light
@@ -74,6 +78,7 @@ class Adaptation:
         self._seed = seed
         self._workers = workers
         self._mean = 0.0
+        self.rays: Counter[str] = Counter()
 
     def refine_receivers(self, receivers: Receivers, limit: int, error: float, *, shadows: bool = True) -> Receivers:
         """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all.
@@ -118,33 +123,48 @@ class Adaptation:
     def _probe(self, cells: Cells, chosen: Int64, number: int, count: int, near: Bool) -> _Probe:
         """What `count` points of each chosen cell see; near (n,): where they may be inside a solid."""
         shift = stream(self._seed, f"adaptation {number}").random((len(cells), 2))
-        near_contact = np.flatnonzero(near)
         seen = []
         for k in range(count):
             points = Points.of_pass(cells, chosen, k, shift)
             streams = _FIRST_STREAM + 100 * number + k
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
+            self.rays += light.rays
             direct = light.irradiance.mean(axis=1)
             hidden = np.zeros(len(chosen), dtype=bool)
-            if self._around is not None and len(near_contact):
-                some = Points.of_pass(cells, chosen[near_contact], k, shift)
-                arriving, _, enclosed, _ = gather_indirect(
-                    some, self._around.hemispheres, self._around.tables[0], self._seed, streams, self._workers
-                )
-                total = arriving[:, :-1] @ self._around.to_grey + direct[near_contact]
+            if self._around is not None:
                 if number == 0:
-                    self._mean = float(total.mean())
-                look = partial(self._seen, self._around, 100_000_000 + streams)
-                hidden[near_contact] = out_of_sight(
-                    some, self._around, enclosed, total, direct[near_contact], self._mean, look
-                )
+                    some = slice(None, None, max(len(chosen) // _MEAN_POINTS, 1))
+                    total, _ = self._look(self._around, streams, Points.of_pass(cells, chosen[some], k, shift))
+                    self._mean = float(direct.mean() + total.mean())
+                # Where the sources shine nothing is hidden.
+                unlit = np.flatnonzero(near & (direct <= 0))
+                if len(unlit):
+                    there = Points.of_pass(cells, chosen[unlit], k, shift)
+                    total, enclosed = self._look(self._around, streams, there)
+                    seen_light = partial(self._seen, self._around, 100_000_000 + streams)
+                    hidden[unlit] = out_of_sight(
+                        there, self._around, enclosed, total, direct[unlit], self._mean, seen_light
+                    )
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
 
+    def _look(self, around: Surroundings, number: int, points: Points) -> tuple[Float64, Bool]:
+        """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; and
+        whether nearly only backs surround them."""
+        arriving, _, enclosed, rays = gather_indirect(
+            points, around.hemispheres, around.tables[0], self._seed, number, self._workers
+        )
+        self.rays += rays
+        return arriving[:, :-1] @ around.to_grey, enclosed
+
     def _seen(self, around: Surroundings, number: int, points: Points) -> Float64:
         """Mean irradiance (n,) of what is seen from the points."""
-        return gather_indirect(points, around.hemispheres, around.lit, self._seed, number, self._workers)[0][:, 0]
+        seen, _, _, rays = gather_indirect(
+            points, around.hemispheres, around.lit, self._seed, number, self._workers
+        )
+        self.rays += rays
+        return seen[:, 0]
 
 
 def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:

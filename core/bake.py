@@ -131,9 +131,10 @@ def finer_where_it_matters(
     adaptation = Adaptation(direct_light, surroundings, seed, workers)
     if effort.coarsest <= 1:
         limit = len(receivers.cells) + int(effort.growth * effort.triangles)
-        return adaptation.refine_receivers(receivers, limit, effort.error, shadows=True), {}
+        return adaptation.refine_receivers(receivers, limit, effort.error, shadows=True), adaptation.rays
     limit = len(receivers.cells) + effort.triangles
     bends = Bends(direct_light, surroundings, effort, seed, workers)
     # Contacts get the rest.
     bent = bends.refine(scene, receivers, 3 * limit // 4)
-    return adaptation.refine_receivers(bent, limit, effort.error, shadows=False), bends.rays
+    adapted = adaptation.refine_receivers(bent, limit, effort.error, shadows=False)
+    return adapted, bends.rays + adaptation.rays

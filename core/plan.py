@@ -45,6 +45,8 @@ _TREE_COST = 8
 #: named: typical of the scenes of `make bench`. Sampling falls with the cube root of the cells, since neighbours share
 #: what they learn; resolution with the square root.
 _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0.01, 32, 20_000
+#: How many times as many cells as is typical count as dense: then a few rays less of each lose nothing.
+_DENSE = 4.0
 #: Errors that the panel shows the price of.
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
 #: How many times as many patches there are after those have been split that light breaks in: typical.
@@ -286,7 +288,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
-        gather_rays=gather_rays(asked),
+        gather_rays=gather_rays(asked, sum(len(o.triangles) for o in scene.receivers())),
         passes=2,
         boundary_passes=8,
         tolerance=min(asked / 20, 1e-3),
@@ -296,6 +298,16 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     )
 
 
-def gather_rays(error: float) -> int:
-    """Rays of a sample point: as many as bring its noise in proportion to the asked error. A power of two."""
-    return int(2 ** np.clip(np.rint(np.log2(32 * (0.02 / error) ** 2)), 3, 6))
+def asked_error(settings: Settings) -> float:
+    """The relative error to aim at; by the clock, as small as time allows."""
+    return settings.error or (0.02 if settings.seconds is None else 0.01)
+
+
+def gather_rays(error: float, cells: int = 0) -> int:
+    """Rays of a sample point: as many as bring its noise in proportion to the asked error. A power of two.
+
+    cells: that there are at least; where they are more than usual their neighbours make up for rays.
+    """
+    dense = max(cells / _TYPICAL_CELLS, 1.0)
+    fewest = 3 if dense < _DENSE else 2
+    return int(2 ** np.clip(np.rint(np.log2(32 * (0.02 / error) ** 2 / dense ** (2 / 3))), fewest, 6))

@@ -67,7 +67,8 @@ def curved_meshes() -> Objects:
     )
     floor = _box("Floor", (-4, -4, -1), (4, 4, 0), [*[None] * 5, white])
     made: Objects = []
-    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.8, location=(-1.2, 0.4, 0.85))
+    # Not a UV sphere: Blender numbers its faces anew each time, and a reference names faces by their numbers.
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=5, radius=0.8, location=(-1.2, 0.4, 0.85))
     made.append(_smooth(blue))
     bpy.ops.mesh.primitive_torus_add(
         major_segments=64, minor_segments=24, major_radius=0.8, minor_radius=0.28, location=(1.2, 0.3, 0.3)
