@@ -298,11 +298,6 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     )
 
 
-def asked_error(settings: Settings) -> float:
-    """The relative error to aim at; by the clock, as small as time allows."""
-    return settings.error or (0.02 if settings.seconds is None else 0.01)
-
-
 def gather_rays(error: float, cells: int = 0) -> int:
     """Rays of a sample point: as many as bring its noise in proportion to the asked error. A power of two.
 

@@ -16,7 +16,7 @@ from .scene import Bool, Float64, Int32
 from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradients
 
 #: Relative error at which conjugate gradients stop: a tenth of what a person asks for at the finest.
-TOLERANCE = 5e-4
+_TOLERANCE = 5e-4
 _MAXIMUM_ITERATIONS = 100
 #: From how much smoothing on a fit has no overshoot that matters, since noise does.
 _NOISY = 5.0
@@ -150,14 +150,16 @@ class Fit:
         )
 
     def solve(
-        self, system: System, alpha: float, start: Float64 | None = None, tolerance: float = TOLERANCE
+        self, system: System, alpha: float, start: Float64 | None = None, tolerance: float | None = None
     ) -> Float64:
         """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha.
 
-        start (v, k): where to begin; by default plain averaging, which is near already. tolerance: relative error.
+        start (v, k): where to begin; by default plain averaging, which is near already. tolerance: relative error; by
+        default a tenth of the finest that is asked for.
         """
         start = self._averages(system) if start is None else start
-        return conjugate_gradients(self.matrix(system, alpha), system.target, start, tolerance, _MAXIMUM_ITERATIONS)
+        most = _TOLERANCE if tolerance is None else tolerance
+        return conjugate_gradients(self.matrix(system, alpha), system.target, start, most, _MAXIMUM_ITERATIONS)
 
     def solve_within(self, system: System, alpha: float, limits: tuple[Float64, Float64]) -> Float64:
         """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
@@ -166,7 +168,7 @@ class Fit:
         the vertex is held at the limit, and the others make the best of that; the mean stays that of the samples.
         """
         matrix = self.matrix(system, alpha)
-        accuracy = TOLERANCE, _MAXIMUM_ITERATIONS
+        accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
         free = conjugate_gradients(matrix, system.target, self._averages(system), *accuracy)
         low, high = within(limits, alpha)
         values = np.clip(free, low, high)
