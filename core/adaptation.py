@@ -160,9 +160,7 @@ class Adaptation:
 
     def _seen(self, around: Surroundings, number: int, points: Points) -> Float64:
         """Mean irradiance (n,) of what is seen from the points."""
-        seen, _, _, rays = gather_indirect(
-            points, around.hemispheres, around.lit, self._seed, number, self._workers
-        )
+        seen, _, _, rays = gather_indirect(points, around.hemispheres, around.lit, self._seed, number, self._workers)
         self.rays += rays
         return seen[:, 0]
 
