@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
+from ..core.cost import refuse_larger_scene
 from ..core.scene import (
     RGB,
     Bool,
@@ -36,6 +37,8 @@ from .world import read_world
 
 #: Points of a triangle that tell whether its sampled opacity varies, and by how much less it does not.
 _OPACITY_POINTS, _EVEN = 64, 1e-3
+#: Triangles read until memory is looked at first, and then whenever they have doubled; as how many an object counts.
+_FIRST_LOOK, _OBJECT = 500_000, 4
 
 
 def pick_receivers(
@@ -149,6 +152,7 @@ class _Reading:
         self.surfaces = _SurfaceTable()
         self.warnings: list[str] = []
         self._meshes: dict[int, _LocalMesh] = {}
+        self._triangles, self._next_look = 0, _FIRST_LOOK
         # For each object with a material to be sampled: its place in `objects`, the number, the order of its corners.
         self._sampled: list[tuple[int, int, list[int]]] = []
 
@@ -220,6 +224,7 @@ class _Reading:
                 size=own.size if own is not None and own.use_size else None,
             )
         )
+        self._look_for_room(len(mesh.triangles))
         if casts and not bounces:
             # What the rest of the scene meets in its place: the same shape, and black.
             black = np.full(len(mesh.triangles), self.surfaces.black(), np.int32)
@@ -254,6 +259,12 @@ class _Reading:
             surface[unread] = self.surfaces.sampled(own.surface, unread, number, sampled[number])
             self.objects[index] = replace(own, surface=surface, uv=uv)
         self.surfaces.forget_unread()
+
+    def _look_for_room(self, triangles: int) -> None:
+        self._triangles += triangles + _OBJECT
+        if self._triangles >= self._next_look:
+            refuse_larger_scene(self._triangles)
+            self._next_look = 2 * self._triangles
 
     def _corner_values(
         self, obj: bpy.types.Object, mesh: _LocalMesh, surface: Int32

@@ -108,6 +108,17 @@ def refuse_without_room(memory_mb: float) -> None:
         )
 
 
+def refuse_larger_scene(triangles: int) -> None:
+    """Raise SceneError if nothing would be left for the bake of a scene of so many triangles: asked while it is read,
+    for some files hold a few faces and millions of instances."""
+    free = free_memory_mb()
+    if free is not None and triangles * _OWN_BYTES / 1e6 > free:
+        raise SceneError(
+            f"The scene has more than {triangles:,} triangles, with all instances, and {free:,.0f} MB of memory are "
+            "free: hide from rendering what the light does not need, or lower subdivisions and the number of instances."
+        )
+
+
 def free_memory_mb() -> float | None:
     """How much memory this process may still take, in MB; None where the system does not tell."""
     if hasattr(ctypes, "windll"):

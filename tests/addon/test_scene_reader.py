@@ -5,8 +5,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
+from radiosity_baker.addon import scene_reader
 from radiosity_baker.addon.copies import ORIGINAL_KEY, PLACE_KEY
 from radiosity_baker.addon.scene_reader import pick_receivers, read_scene
+from radiosity_baker.core import cost
 from radiosity_baker.core.scene import SceneError
 
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -393,3 +395,14 @@ def test_instances_share_one_conversion_and_warn_once(add_mesh, add_material):
     assert sorted(warning.split(" ")[1] for warning in scene.warnings) == ["'Glass'", "'One'"]
     lefts = sorted(obj.vertices[:, 0].min() for obj in scene.objects)
     np.testing.assert_allclose(lefts, (0.0, 2.0, 3.0, 4.0))
+
+
+def test_a_scene_larger_than_memory_is_refused_while_it_is_read(add_mesh, monkeypatch):
+    """Two cubes, of which the second is one too many."""
+    first, second = (add_mesh(name=name, vertices=CUBE, faces=CUBE_FACES) for name in ("First", "Second"))
+    monkeypatch.setattr(scene_reader, "_FIRST_LOOK", 30)
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: 1e-6)
+    with pytest.raises(SceneError, match="hide from rendering"):
+        read(first, second)
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: 1e6)
+    assert len(read(first, second)[0].objects) == 2

@@ -301,7 +301,7 @@ def without_size(lamp):
 def test_the_light_of_all_lamps_is_the_sum_of_the_light_of_each(scene, estimator):
     """On every side, to the tolerance of as many solutions, with the same rays and one seed; and whiter surfaces are
     nowhere darker. Catches a solution that depends on anything but the sources, linearly. Seen to fail: a clip of
-    negative light in between, a lamp left out by what others bring."""
+    negative light in between."""
     with Stages(scene, estimator) as stages:
         lamps = [without_size(lamp) for lamp in stages.scene.lamps]
         alone = [stages.solved([lamp]) for lamp in lamps] + [stages.solved([], sky=stages.sky)]
@@ -323,7 +323,7 @@ def test_the_light_of_all_lamps_is_the_sum_of_the_light_of_each(scene, estimator
 @given(scenes(), st.booleans())
 def test_what_is_baked_can_be_shown(scene, tessellate):
     """All layers are finite and not negative, and the same bytes with 1 and 2 threads, whatever the order of objects
-    and lamps. Seen to fail: a fit whose values are not clipped, a stream of random numbers for each thread."""
+    and lamps. Seen to fail: limits of the fit below zero, conjugate gradients that go on where nothing is left."""
     first = quick_bake(scene, tessellate=tessellate)
     one = layers_of(first)
     for name, values in one.items():
@@ -353,8 +353,8 @@ def brighter(scene: Scene, factor: float) -> Scene:
 @tries(10)
 @given(scenes(), st.sampled_from([2.0**-10, 4.0, 2.0**20]))
 def test_twice_the_light_is_twice_as_bright(scene, factor):
-    """Exactly, since every decision of a bake is relative and a power of two rounds nothing. Seen to fail: an absolute
-    threshold for dark points."""
+    """Exactly, since every decision of a bake is relative and a power of two rounds nothing. Seen to fail: conjugate
+    gradients that go on where nothing is left."""
     dim, bright = layers_of(quick_bake(scene)), layers_of(quick_bake(brighter(scene, factor)))
     for name, values in dim.items():
         scaled = values if name in VIEWS else values * np.float32(factor)
@@ -396,8 +396,7 @@ CHANGES = {
 @given(scenes(), st.sampled_from(sorted(CHANGES)))
 def test_nothing_depends_on_where_or_how_the_scene_is_given(scene, change):
     """The mean light is the same, within twice what both bakes state as their errors: statements from so few samples.
-    Catches axes that are special, lost mirror images, and sizes in metres that decide something. Seen to fail: an
-    offset of rays in metres.
+    Catches axes that are special, lost mirror images, and sizes in metres that decide something.
 
     Surfaces reflect half at most. What all patches of a room share, such as how much of it a few rays say is black,
     counts 1 / (1 - p) times, and only two solutions tell how far it is off: by chance they may agree."""
@@ -411,8 +410,7 @@ def test_nothing_depends_on_where_or_how_the_scene_is_given(scene, change):
 @tries(10)
 @given(scenes(), st.booleans())
 def test_a_closed_room_sees_no_sky(scene, inward):
-    """Catches cracks and leaks: rays that start behind their wall, seams that are not tight, and lost hits. Seen to
-    fail: rays that start on the surface itself."""
+    """Catches cracks and leaks: rays that start behind their wall, seams that are not tight, and lost hits."""
     corners = np.concatenate([o.vertices[o.triangles].reshape(-1, 3) for o in scene.objects])
     low, high = corners.min(axis=0), corners.max(axis=0)
     margin = 0.1 * (high - low).max() + 1e-9
