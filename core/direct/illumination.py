@@ -18,8 +18,9 @@ from .lamps import Light
 
 #: A light this far under the brightest one at a point, relatively, is not worth a shadow ray there.
 _NEGLIGIBLE = 1e-7
-#: Of more lights than this, each half of the rays asks so many at a point.
-MOST_ASKED = 16
+#: Of more lights than this, each half of the rays asks so many at a point. Noise falls much faster with this number
+#: than time grows: most of the time goes into the closed forms of all lights.
+MOST_ASKED = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,8 +137,8 @@ class DirectLight:
     def _ask_some(self, tally: _Tally, points: Float64, shading: Float64, rays: int, rng: np.random.Generator) -> None:
         """Add what all lights bring: the brightest at a point one by one, the others by some of them.
 
-        Each half of the rays draws lights of its own. As with a single light, what the drawn ones would bring with
-        nothing in the way is corrected by what all would bring.
+        Each half of the rays draws lights of its own, one ray to each. As with a single light, what the drawn ones
+        would bring with nothing in the way is corrected by what all would bring.
         """
         shares = np.stack([light.share(points, shading) for light in self.lights])
         color = np.stack([light.color for light in self.lights])
@@ -153,8 +154,7 @@ class DirectLight:
             half, lit = np.nonzero(drawn[:, number])
             if not len(lit):
                 continue
-            count = max(1, rays // 2) if light.sized else 1
-            look = self._look(light, tally.receivers.only(lit), _lattices(1, count, len(lit), rng))
+            look = self._look(light, tally.receivers.only(lit), _lattices(1, 1, len(lit), rng))
             scale = color[number] / chance[number, lit][:, None]
             # A way without size brings exactly the share, however its length was rounded.
             whole = look.weights.mean(axis=0) if light.sized else shares[number, lit]
@@ -163,7 +163,7 @@ class DirectLight:
             arrived[half, lit] += part.T * scale
             np.add.at(free, lit, look.free.sum(axis=0))
             np.add.at(clear, lit, look.clear.sum(axis=0))
-            np.add.at(asked, lit, count)
+            np.add.at(asked, lit, 1)
             tally.rays += look.rays
         every = np.einsum("ln,lk->nk", np.where(sure, 0.0, shares), color)
         seen = _seen_in_all(every, expected, arrived)
