@@ -19,6 +19,8 @@ from ..core.scene import Float32
 
 #: How far the picture is drawn before the surface it lies on, as a share of the depth range.
 _BEFORE = 2e-5
+#: Corners that go to the graphics card at a time: a few milliseconds.
+_AT_ONCE = 150_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,20 +50,35 @@ class LiveLight:
 
     def __init__(self, scene: bpy.types.Scene) -> None:
         self._scene = scene.session_uid
-        self._batch: Any = None
+        self._batches: list[Any] = []
+        self._coming: list[Any] = []
+        self._picture: Picture | None = None
         self._shader = gpu.shader.from_builtin("SMOOTH_COLOR")
         self._handle = bpy.types.SpaceView3D.draw_handler_add(self._draw, (), "WINDOW", "POST_VIEW")
 
     def show(self, picture: Picture) -> None:
-        content = {"pos": picture.positions, "color": picture.colors}
-        self._batch = batch_for_shader(self._shader, "TRIS", content)
+        """From now on; until `load` has all of it, what was shown before stays."""
+        self._picture, self._coming = picture, []
+
+    def load(self) -> bool:
+        """One more piece of the picture; whether that was the last, and there is something new to be seen."""
+        if self._picture is None:
+            return False
+        begin = len(self._coming) * _AT_ONCE
+        piece = slice(begin, begin + _AT_ONCE)
+        content = {"pos": self._picture.positions[piece], "color": self._picture.colors[piece]}
+        self._coming.append(batch_for_shader(self._shader, "TRIS", content))
+        if piece.stop < len(self._picture.positions):
+            return False
+        self._batches, self._coming, self._picture = self._coming, [], None
+        return True
 
     def remove(self) -> None:
         bpy.types.SpaceView3D.draw_handler_remove(self._handle, "WINDOW")
 
     def _draw(self) -> None:
         context = bpy.context
-        if self._batch is None or context.scene.session_uid != self._scene:
+        if not self._batches or context.scene.session_uid != self._scene:
             return
         projection = context.region_data.window_matrix.copy()
         projection[2] = projection[2] - _BEFORE * projection[3]
@@ -69,6 +86,7 @@ class LiveLight:
         gpu.state.depth_mask_set(True)
         with gpu.matrix.push_pop_projection():
             gpu.matrix.load_projection_matrix(projection)
-            self._batch.draw(self._shader)
+            for batch in self._batches:
+                batch.draw(self._shader)
         gpu.state.depth_mask_set(False)
         gpu.state.depth_test_set("NONE")

@@ -100,10 +100,12 @@ class WindowBake:
         WindowBake.running = None
 
     def _show(self, context: bpy.types.Context) -> None:
-        picture = self.job.picture
-        if self._live is not None and picture is not self._shown:
-            self._shown = picture
-            self._live.show(picture)
+        if self._live is None:
+            return
+        if self.job.picture is not self._shown:
+            self._shown = self.job.picture
+            self._live.show(self._shown)
+        if self._live.load():
             viewport.redraw(context)
 
     def _may_write(self, context: bpy.types.Context) -> bool:

@@ -219,7 +219,7 @@ def time_first_light():
 
     def draw(self):
         plain_draw(self)
-        if self._batch is not None:
+        if self._batches:
             note("on the screen")
 
     window_bake.__init__, live_light.show, live_light._draw = begin, show, draw
