@@ -25,8 +25,8 @@ from .scene import Bool, Float64
 from .survey import Surroundings, out_of_sight
 from .tessellation import Int64
 
-#: How often a cell, and a cell that only a contact crosses, is split into four at most.
-LEVELS, CONTACT_LEVELS = 4, 2
+#: How often a cell is split into four at most.
+LEVELS = 4
 #: How far light may jump inside a cell, relative to the mean and to the error asked for: few cells are crossed, and
 #: what the fit leaves of a jump is a fraction of it.
 _BOUNDARY_STEP = 12.0
@@ -80,27 +80,19 @@ class Adaptation:
         self._mean = 0.0
         self.rays: Counter[str] = Counter()
 
-    def refine_receivers(self, receivers: Receivers, limit: int, error: float, *, shadows: bool = True) -> Receivers:
-        """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all.
-
-        shadows: along shadow edges as well as contacts.
-        """
+    def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
+        """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
         every = np.arange(len(receivers.cells))
         first = self._probe(receivers.cells, every, 0, 1, every >= 0)
-        if not shadows:
-            first = replace(first, signature=np.zeros_like(first.signature))
         mean, fair = _fair_share(receivers.cells.area, first.direct[0], _BOUNDARY_STEP * error)
         fresh, hidden = _on_borders(receivers, first, fair), first.hidden[0]
-        for level in range(LEVELS if shadows else CONTACT_LEVELS):
+        for level in range(LEVELS):
             near = _touching(receivers, hidden)
             split, contact = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit, near)
-            if not shadows:
-                split = contact
             if not split.any():
                 break
-            if shadows:
-                # What is hidden beside a contact must not be coarse either: light would reach far into it.
-                split |= hidden & _touching(receivers, contact)
+            # What is hidden beside a contact must not be coarse either: light would reach far into it.
+            split |= hidden & _touching(receivers, contact)
             # A boundary that points have missed in one cell shows in its neighbours, so these are looked at again.
             doubtful = _touching(receivers, split)
             receivers, source = split_cells(receivers, split)

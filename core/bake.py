@@ -10,6 +10,7 @@ from .baked import Baked
 from .bending import Bends
 from .check import check_cost, check_scene
 from .clock import Clock
+from .contours import Contours
 from .cost import calibrate
 from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
@@ -127,14 +128,16 @@ def finer_where_it_matters(
     seed: int,
     workers: Workers,
 ) -> tuple[Receivers, dict[str, int]]:
-    """Triangles split where light bends, if they start coarse, and where it breaks; and the rays it took to tell."""
+    """Triangles cut where light breaks, and split where it bends if they start coarse; and the rays it took to tell.
+    Meshes that are kept are sampled more finely where light breaks."""
+    contours = Contours(scene, direct_light, surroundings, seed, workers)
+    if effort.coarsest > 1:
+        bends = Bends(direct_light, surroundings, contours, effort, seed, workers)
+        receivers = bends.refine(scene, receivers, len(receivers.cells) + effort.triangles)
+        return receivers, bends.rays + contours.rays
+    limit = len(receivers.cells) + int(effort.growth * effort.triangles)
     adaptation = Adaptation(direct_light, surroundings, seed, workers)
-    if effort.coarsest <= 1:
-        limit = len(receivers.cells) + int(effort.growth * effort.triangles)
-        return adaptation.refine_receivers(receivers, limit, effort.error, shadows=True), adaptation.rays
-    limit = len(receivers.cells) + effort.triangles
-    bends = Bends(direct_light, surroundings, effort, seed, workers)
-    # Contacts get the rest.
-    bent = bends.refine(scene, receivers, 3 * limit // 4)
-    adapted = adaptation.refine_receivers(bent, limit, effort.error, shadows=False)
-    return adapted, bends.rays + adaptation.rays
+    receivers = adaptation.refine_receivers(receivers, limit, effort.error)
+    if receivers.tessellated:
+        receivers = contours.cut(receivers)[0]
+    return receivers, adaptation.rays + contours.rays

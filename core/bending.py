@@ -12,14 +12,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from .contours import Contours
 from .direct.illumination import DirectLight
 from .parallel import Workers
+from .patches import Cells
 from .plan import Effort
 from .receivers import Receivers, split_cells
 from .refinement import fit_samples
 from .sampling import stream, subseed
 from .scene import Bool, Scene
 from .survey import Surroundings, Survey
+from .tessellation import Int64
 
 #: How often cells are split at most; passes over them before each time, and rays of each point that look around.
 _ROUNDS, _PASSES, _RAYS = 4, 4, 16
@@ -33,7 +36,13 @@ class Bends:
     """Splits triangles where light bends. rays: cast so far, by purpose."""
 
     def __init__(
-        self, direct_light: DirectLight, around: Surroundings | None, effort: Effort, seed: int, workers: Workers
+        self,
+        direct_light: DirectLight,
+        around: Surroundings | None,
+        contours: Contours,
+        effort: Effort,
+        seed: int,
+        workers: Workers,
     ) -> None:
         self.rays: Counter[str] = Counter()
         self._light = direct_light
@@ -41,32 +50,35 @@ class Bends:
             around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "bend patterns"))
         )
         self._effort = effort
+        self._contours = contours
         self._seed = seed
         self._workers = workers
 
     def refine(self, scene: Scene, receivers: Receivers, limit: int) -> Receivers:
-        """The receivers with at most about `limit` cells, finer where light bends by more than is allowed."""
+        """The receivers with at most about `limit` cells, cut along contours, and finer where light still bends by more
+        than is allowed."""
         for number in range(_ROUNDS):
+            trial, source = self._contours.cut(receivers)
             # Other samples than those of the bake: its noise must not depend on which cells theirs has split.
             seed = subseed(self._seed, f"bends {number}")
-            survey = Survey(receivers, self._light, self._around, self._effort, seed, self._workers)
+            survey = Survey(trial, self._light, self._around, self._effort, seed, self._workers)
             for _ in range(_PASSES):
                 survey.run_pass()
             self.rays += survey.rays
-            chosen = self._worst(scene, survey, limit)
+            chosen = self._worst(scene, survey, receivers.cells, source, limit)
             if not chosen.any():
-                break
+                return trial
             receivers = split_cells(receivers, chosen)[0]
-        return receivers
+        return self._contours.cut(receivers)[0]
 
-    def _worst(self, scene: Scene, survey: Survey, limit: int) -> Bool:
+    def _worst(self, scene: Scene, survey: Survey, cells: Cells, source: Int64, limit: int) -> Bool:
         """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
-        cells = survey.receivers.cells
         found = fit_samples(survey, scene, self._workers)
-        squared = found.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
+        pieces = found.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
+        squared = np.bincount(source, pieces, len(cells))
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         # A split cell becomes four, and makes its neighbours become two or three.
-        room = max((limit - len(cells)) // 5, 0)
+        room = max((limit - len(source)) // 5, 0)
         large = cells.area > _SMALLEST * cells.area.sum() / limit
         order = np.argsort(np.where(large, -squared, 0.0), kind="stable")
         positive = np.maximum(squared[order], 0.0)

@@ -120,6 +120,12 @@ class Hemispheres:
         ways = (reach[:, None] * normals).astype(np.float32)
         return ~self._visibility.unblocked_along(offset_along(points, normals), ways)
 
+    def inside(self, points: Float64, normals: Float64) -> Bool:
+        """Whether what lies straight above each point (n, 3) shows its back: it may be inside a solid."""
+        directions = normals.astype(np.float32)
+        hit = self._visibility.nearest(offset_along(points, normals), directions)
+        return np.asarray((hit >= 0) & (self._sides(hit, directions) >= self.codes.patches))
+
     def _sides(self, hit: Int32, directions: Float32) -> Int32:
         """The code of the side of a patch that each ray has met; of no meaning for rays that met nothing."""
         met = self._met[hit]

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
-from .tessellation import Int64, Tessellation, edge_for_count, edge_keys, split_triangles, triform, whole
+from .tessellation import (
+    Int64,
+    Tessellation,
+    cut_edges,
+    edge_for_count,
+    edge_keys,
+    split_triangles,
+    triform,
+    whole,
+)
 from .textures import Colours, constant_colours, mean_colours, varies
 
 #: Corners whose shading normals differ by less than this angle (cosine) share one value.
@@ -26,7 +38,8 @@ class Receivers:
 
     first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
     the unit box, element_shading (e, 3, 3) their corners' normals, element_surface (e,) into Scene.surfaces.
-    places (e, 3, k): what else, if given, breaks the fit where it changes over an edge.
+    places (e, 3, k): what else, if given, breaks the fit where it changes over an edge. breaks (e, 3): sides, from each
+    corner to the next, over which light jumps, so that the fit breaks there; None if there is none.
     """
 
     space: Space
@@ -39,11 +52,17 @@ class Receivers:
     element_shading: Float64
     element_surface: Int32
     places: Float64 | None = None
+    breaks: Bool | None = None
 
     @property
     def corner_vertex(self) -> Int32:
         """(e, 3) the fit vertex of each corner of the output triangles."""
         return self._fit_vertices[0]
+
+    @property
+    def tessellated(self) -> bool:
+        """Whether the cells are the output triangles, rather than lie in the input's own."""
+        return self.meshes == self.fine
 
     @property
     def vertices(self) -> int:
@@ -53,7 +72,9 @@ class Receivers:
     @cached_property
     def _fit_vertices(self) -> tuple[Int32, int]:
         # Only when someone asks: while triangles are still being split, nobody does.
-        return fit_vertices(_numbered(self.meshes), self.element_shading, self.element_surface, self.places)
+        return fit_vertices(
+            _numbered(self.meshes), self.element_shading, self.element_surface, self.places, self.breaks
+        )
 
     def vertex_means(self, values: Float64) -> Float64:
         """Means (v,) of the values (c,) of the cells around each fit vertex, by area."""
@@ -141,15 +162,31 @@ def _numbered(meshes: tuple[Tessellation, ...]) -> Int32:
 
 def split_cells(receivers: Receivers, chosen: Bool) -> tuple[Receivers, Int64]:
     """The receivers with the chosen (c,) cells split into four; and for each new cell the one it came from."""
+    return _split_each(receivers, chosen, split_triangles)
+
+
+def cut_cells(receivers: Receivers, places: Float64) -> tuple[Receivers, Int64]:
+    """The receivers with sides of cells cut at places (c, 3), see `tessellation.cut_edges`; and for each new cell the
+    one it came from."""
+    return _split_each(receivers, places, cut_edges)
+
+
+def _split_each(
+    receivers: Receivers,
+    where: NDArray[Any],
+    split_mesh: Callable[[Tessellation, NDArray[Any]], tuple[Tessellation, Int64]],
+) -> tuple[Receivers, Int64]:
+    """Split the mesh of each receiver where (c, ...) it says for its cells."""
     fine, sources, begin = [], [], 0
     for mesh in receivers.fine:
         end = begin + len(mesh.triangles)
-        split, source = split_triangles(mesh, chosen[begin:end])
+        split, source = split_mesh(mesh, where[begin:end])
         fine.append(split)
         sources.append(source + begin)
         begin = end
-    tessellate = receivers.meshes == receivers.fine
-    split_receivers = lay_out(receivers.objects, fine, receivers.space, receivers.cells.front, tessellate=tessellate)
+    split_receivers = lay_out(
+        receivers.objects, fine, receivers.space, receivers.cells.front, tessellate=receivers.tessellated
+    )
     return split_receivers, np.concatenate(sources)
 
 
@@ -165,13 +202,13 @@ def cell_colours(scene: Scene, receivers: Receivers) -> Colours:
 
 
 def fit_vertices(
-    triangles: Int32, normals: Float64, surface: Int32, places: Float64 | None = None
+    triangles: Int32, normals: Float64, surface: Int32, places: Float64 | None = None, breaks: Bool | None = None
 ) -> tuple[Int32, int]:
     """Number (t, 3) of each corner's fit vertex, and how many there are.
 
     Corners at one vertex share a value when a chain of edges joins their triangles across which neither the surface
     (t,) nor the shading normals (t, 3, 3) at the edge's ends change: hard edges and material borders do not bleed.
-    Nor may the corners' places (t, 3, k) change, where these are given.
+    Nor may the corners' places (t, 3, k) change, or the edge be one of the breaks (t, 3), where these are given.
     """
     corner = np.arange(triangles.size).reshape(-1, 3)
     here, there = shared_edges(triangles)
@@ -182,6 +219,8 @@ def fit_vertices(
         if places is not None:
             placed = places.reshape(triangles.size, -1)
             joined &= np.abs(placed[here[:, end]] - placed[there[:, end]]).max(axis=1) < _SAME_PLACE
+    if breaks is not None:
+        joined &= ~breaks.ravel()[here[:, 0]]
     label = _components(corner.size, here[joined].reshape(-1), there[joined].reshape(-1))
     unique, number = np.unique(label, return_inverse=True)
     return number.reshape(-1, 3).astype(np.int32), len(unique)

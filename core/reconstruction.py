@@ -24,6 +24,8 @@ _NOISY = 5.0
 _ENDLESS = 1e100
 #: How much light limits may add or take in all, relatively, before it is passed on, and how far it is.
 _ADDED, _MOST_RINGS = 5e-3, 30
+#: Samples that together weigh less than this at a vertex, where one has a third on average, say nothing of it.
+_MEASURED = 0.02
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 #: Which of these six belongs to each side of a triangle.
@@ -108,21 +110,21 @@ class System:
 class Fit:
     """Least squares onto the fit vertices of the receivers.
 
-    count (c,): valid samples of each cell; where there is none the fit has nothing to say, and `fill` does.
-    hidden (c,): cells of which some sample was out of sight. Of the vertices (v,), those that no valid sample tells of
-    are not `measured`; they are `filled` when they share an edge with one that is, since what is seen reaches there.
+    lumped (c, 3): how much the valid samples weigh at each corner; where that is next to nothing the fit has nothing to
+    say, and `fill` does. hidden (c,): cells of which some sample was out of sight. Of the vertices (v,), those that no
+    valid sample tells of are not `measured`; they are `filled` when they share an edge with one that is, since what is
+    seen reaches there. broken (c,): cells with a corner where the fit breaks along a contour.
     """
 
-    def __init__(self, receivers: Receivers, count: Float64, hidden: Bool) -> None:
+    def __init__(self, receivers: Receivers, lumped: Float64, hidden: Bool) -> None:
         self._receivers = receivers
         self._count = receivers.vertices
         self._corner = receivers.corner_vertex[receivers.cells.element]
-        sampled = np.repeat((count > 0)[:, None], 3, axis=1)
-        if receivers.cells.barycentric is not None:
-            sampled &= receivers.cells.barycentric.max(axis=1) > 0
-        self.measured = self._scatter(sampled) > 0
+        self.measured = self._scatter(lumped) > _MEASURED
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
         self._edge, self._edge_ends = numbered_edges(receivers.corner_vertex)
+        self.broken = self._at_breaks(receivers)
+        self._both_known = self.measured[self._edge_ends].all(axis=1)
         self.filled = ~self.measured & self._beside_measured()
         jumps = gradient_jumps(receivers, self.measured)
         around = np.bincount(receivers.corner_vertex.ravel(), minlength=self._count)
@@ -142,10 +144,11 @@ class Fit:
         moments = samples.moments * weight[:, None]
         light = samples.light * weight[:, None, None]
         edges = self._edge[self._receivers.cells.element].ravel()
+        known = self.measured
         return System(
-            diagonal=self._scatter(moments[:, :3]),
-            edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)).astype(np.float64),
-            target=np.stack([self._scatter(light[..., k]) for k in range(light.shape[2])], axis=1),
+            diagonal=self._scatter(moments[:, :3]) * known,
+            edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)) * self._both_known,
+            target=np.stack([self._scatter(light[..., k]) * known for k in range(light.shape[2])], axis=1),
             lumped=self._scatter(samples.lumped * weight[:, None]),
         )
 
@@ -266,6 +269,14 @@ class Fit:
             known = known | fresh | self.hidden
             edge = fresh[one] & ~known[two]
         return values
+
+    def _at_breaks(self, receivers: Receivers) -> Bool:
+        if receivers.breaks is None:
+            return np.zeros(len(receivers.cells), dtype=bool)
+        ends = receivers.breaks | np.roll(receivers.breaks, 1, axis=1)
+        at_break = np.zeros(self._count, dtype=bool)
+        at_break[receivers.corner_vertex[ends]] = True
+        return np.asarray(at_break[self._corner].any(axis=1))
 
     def _neighbours(self) -> tuple[Int32, Int32]:
         """Both ends of all edges, each edge both ways."""

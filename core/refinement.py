@@ -143,7 +143,7 @@ class FittedSurvey:
 def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     """Fit all samples so far, as smoothly as each kind of light wants it."""
     receivers = survey.receivers
-    fit = Fit(receivers, survey.valid_samples, survey.invalid)
+    fit = Fit(receivers, survey.lumped, survey.invalid)
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
     area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
@@ -156,7 +156,7 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
 
 def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
     """The light with a smoothing that is given, and with nothing known of its error."""
-    fit = Fit(survey.receivers, survey.valid_samples, survey.invalid)
+    fit = Fit(survey.receivers, survey.lumped, survey.invalid)
     values = []
     for halves, alpha in zip((survey.direct, survey.indirect), alphas, strict=False):
         both = halves[0] + halves[1]

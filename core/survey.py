@@ -35,7 +35,7 @@ _LIT = 0.25
 
 #: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
 #: sides, for what shows of it beside a straight outline has a corner.
-_BESIDES = np.concatenate([0.98 * np.eye(3) + 0.02 / 3, 0.49 * (1.0 - np.eye(3)) + 0.02 / 3])
+_BESIDES = np.concatenate([0.997 * np.eye(3) + 1e-3, 0.4985 * (1.0 - np.eye(3)) + 1e-3])
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +194,11 @@ class Survey:
     def share_in_sight(self) -> Float64:
         """(c,) share of each cell's samples that are in sight."""
         return self.valid_samples / np.maximum(self.direct[0].tried + self.direct[1].tried, 1.0)
+
+    @property
+    def lumped(self) -> Float64:
+        """(c, 3) how much these weigh at the corners of the cell's output triangle."""
+        return self.direct[0].lumped + self.direct[1].lumped
 
     def run_pass(self) -> None:
         """One more point in every cell."""

@@ -85,16 +85,26 @@ def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int
     return _split(mesh, marked)
 
 
-def _split(mesh: Tessellation, marked: Bool) -> tuple[Tessellation, Int64]:
-    """Split the marked edges (t, 3): from corner 0 to 1, 1 to 2, 2 to 0. Both sides of an edge must agree."""
+def cut_edges(mesh: Tessellation, places: Float64) -> tuple[Tessellation, Int64]:
+    """Split edges (t, 3) at places, 0 to 1 from the end with the lower number to the other; nan where they stay whole.
+
+    Both sides of an edge must agree. Also returns, for each new triangle, the one it came from.
+    """
+    return _split(mesh, np.isfinite(places), places)
+
+
+def _split(mesh: Tessellation, marked: Bool, places: Float64 | None = None) -> tuple[Tessellation, Int64]:
+    """Split the marked edges (t, 3): from corner 0 to 1, 1 to 2, 2 to 0. Both sides of an edge must agree, also on the
+    place (t, 3), the midpoint unless given."""
     number = np.count_nonzero(marked, axis=1)
     # Children stand where their parent stood, so neighbours in space stay neighbours in memory.
     source = np.repeat(np.arange(len(number)), number + 1)
     begin = np.cumsum(number + 1) - number - 1
     triangles, barycentric = mesh.triangles[source], mesh.barycentric[source]
     parents = np.flatnonzero(number)
-    midpoint, vertices = _midpoints(mesh, parents, marked[parents])
-    six, weights = _turned(mesh, parents, midpoint, marked[parents])
+    own = np.full((len(parents), 3), 0.5) if places is None else places[parents]
+    midpoint, vertices = _midpoints(mesh, parents, marked[parents], own)
+    six, weights = _turned(mesh, parents, midpoint, marked[parents], own)
     for template, chosen in _templates(number[parents], vertices, six):
         place = begin[parents[chosen], None] + np.arange(len(template))
         triangles[place] = six[chosen[:, None, None], template]
@@ -102,14 +112,16 @@ def _split(mesh: Tessellation, marked: Bool) -> tuple[Tessellation, Int64]:
     return Tessellation(vertices, triangles, mesh.parent[source], barycentric), source
 
 
-def _midpoints(mesh: Tessellation, parents: Int64, marked: Bool) -> tuple[Int32, Float64]:
+def _midpoints(mesh: Tessellation, parents: Int64, marked: Bool, places: Float64) -> tuple[Int32, Float64]:
     """One new vertex for each marked edge (n, 3) of the parents (n,), shared by the triangles on both of its sides."""
     count = len(mesh.vertices)
-    unique, number = np.unique(edge_keys(mesh.triangles[parents], count)[marked], return_inverse=True)
-    first, second = unique // count, unique % count
+    keys = edge_keys(mesh.triangles[parents], count)[marked]
+    unique, at, number = np.unique(keys, return_index=True, return_inverse=True)
+    first, second, along = unique // count, unique % count, places[marked][at, None]
     midpoint = np.full(marked.shape, -1, dtype=np.int32)
     midpoint[marked] = count + number.reshape(-1)
-    return midpoint, np.concatenate([mesh.vertices, (mesh.vertices[first] + mesh.vertices[second]) / 2])
+    between = (1.0 - along) * mesh.vertices[first] + along * mesh.vertices[second]
+    return midpoint, np.concatenate([mesh.vertices, between])
 
 
 def edge_keys(triangles: Int32, vertices: int) -> Int64:
@@ -118,12 +130,15 @@ def edge_keys(triangles: Int32, vertices: int) -> Int64:
     return np.asarray(np.minimum(start, end) * vertices + np.maximum(start, end))
 
 
-def _turned(mesh: Tessellation, parents: Int64, midpoint: Int32, marked: Bool) -> tuple[Int32, Float64]:
+def _turned(
+    mesh: Tessellation, parents: Int64, midpoint: Int32, marked: Bool, places: Float64
+) -> tuple[Int32, Float64]:
     """Vertices (n, 6) and weights (n, 6, 3) of corners and edge midpoints, turned so that the split edges come first:
     ab when one is split, ab and bc when two are."""
-    barycentric = mesh.barycentric[parents]
-    six = np.concatenate([mesh.triangles[parents], midpoint], axis=1)
-    weights = np.concatenate([barycentric, (barycentric + barycentric[:, [1, 2, 0]]) / 2], axis=1)
+    barycentric, corners = mesh.barycentric[parents], mesh.triangles[parents]
+    six = np.concatenate([corners, midpoint], axis=1)
+    along = np.where(corners < corners[:, [1, 2, 0]], places, 1.0 - places)[:, :, None]
+    weights = np.concatenate([barycentric, (1.0 - along) * barycentric + along * barycentric[:, [1, 2, 0]]], axis=1)
     number = np.count_nonzero(marked, axis=1)
     turn = np.where(number == 1, np.argmax(marked, axis=1), 0)
     turn = np.where(number == 2, (np.argmin(marked, axis=1) + 1) % 3, turn)

@@ -30,7 +30,7 @@ class TexturedFit:
         self._receivers = receivers
         own = replace(receivers, places=_places(scene, receivers))
         cells = len(receivers.cells)
-        self._fit = Fit(own, np.ones(cells), np.zeros(cells, dtype=bool))
+        self._fit = Fit(own, np.ones((cells, 3)), np.zeros(cells, dtype=bool))
         self._corner = own.corner_vertex
         points = even_points(_POINTS)
         self._weights = [_in_elements(receivers, point) for point in points]

@@ -18,6 +18,9 @@ from .lamps import Light
 
 #: A light this far under the brightest one at a point, relatively, is not worth a shadow ray there.
 _NEGLIGIBLE = 1e-7
+#: Places on the rim of a disc, and at the corners of a rectangle or a triangle.
+_RIM = np.array([[0.98, 0.98, 0.98, 0.98], [0.0, 0.25, 0.5, 0.75]], dtype=np.float32)
+_CORNERS = np.array([[0.01, 0.99, 0.99, 0.01], [0.01, 0.01, 0.99, 0.99]], dtype=np.float32)
 #: Of more lights than this, each half of the rays asks so many at a point. Noise falls much faster with this number
 #: than time grows: most of the time goes into the closed forms of all lights.
 MOST_ASKED = 48
@@ -105,6 +108,29 @@ class DirectLight:
         for tree in self._trees:
             self._shoot(tally, tree, rays, rng)
         return tally.illumination()
+
+    def shadows(self, points: Float64, normals: Float64) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+        """Lights of which some is hidden from each point (n, 3) by something else than the surface itself, with normals
+        (n, 3), and lights that are hidden as a whole: two numbers (n,), a bit for each light; and the rays it took.
+        What shines through veils is not hidden."""
+        along = np.stack([points.T, normals.T, normals.T]).astype(np.float32)
+        origins = offset_along(points, normals)
+        some, whole = np.zeros((2, len(points)), dtype=np.int64)
+        rays = 0
+        for number, light in enumerate(self.lights):
+            if not light.casts_shadow:
+                continue
+            lit = np.flatnonzero(light.share(points, normals) > 0)
+            rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
+            towards = light.aim(along[0][:, lit], np.repeat(rim, len(lit), axis=2)).towards
+            below = (towards * along[1][:, None, lit]).sum(axis=0) <= 0
+            ways = (towards - np.float32(OFFSET) * along[1][:, None, lit]).transpose(1, 2, 0).reshape(-1, 3)
+            free = self.visibility.unblocked_along(np.tile(origins[lit], (len(below), 1)), np.ascontiguousarray(ways))
+            hidden = ~free.reshape(below.shape) & ~below
+            some[lit] |= hidden.any(axis=0).astype(np.int64) << number
+            whole[lit] |= (hidden | below).all(axis=0).astype(np.int64) << number
+            rays += below.size
+        return some, whole, rays
 
     def _ask(
         self,

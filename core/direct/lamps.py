@@ -47,12 +47,13 @@ class Ways:
 
 class Light(Protocol):
     """A light source in the unit box. color (3,) float64. sized: whether its shadows are soft; casts_shadow: whether
-    it has any."""
+    it has any; round: whether it looks like a disc."""
 
     name: str
     color: Float64
     sized: bool
     casts_shadow: bool
+    round: bool
 
     def share(self, points: Float64, normals: Float64) -> Float64: ...
 
@@ -100,6 +101,8 @@ class Ball:
 
     A sphere looks like its silhouette: a disc a little nearer and a little smaller, so one set of formulas serves both.
     """
+
+    round = True
 
     def __init__(self, lamp: PointLamp | SpotLamp, space: Space) -> None:
         self.name = lamp.name
@@ -179,6 +182,8 @@ class Spot(Ball):
 
 class Sun:
     """Parallel light from a disc in the sky."""
+
+    round = True
 
     def __init__(self, lamp: SunLamp) -> None:
         self.name = lamp.name

@@ -75,7 +75,7 @@ def test_the_error_of_a_fit_is_a_known_share_of_its_bends(floor, profile, low, h
     bend = error = 0.0
     for light in fronts(profile):
         samples = sample(floor, light, 4, rng)
-        fit = Fit(floor, samples.count, np.zeros(len(floor.cells), bool))
+        fit = Fit(floor, samples.lumped, np.zeros(len(floor.cells), bool))
         values = fit.solve(fit.system(samples), ALPHAS[0])
         bend += floor.cells.area @ fit.bending(values, values) / floor.cells.area.sum()
         error += squared_error(floor, light, fit.at_corners(values)[..., 0], rng)
@@ -86,7 +86,7 @@ def test_independent_noise_bends_nothing(floor):
     """The product of n independent bends of either sign is 1/sqrt(n) of their squares; here within four deviations."""
     rng = np.random.default_rng(2)
     halves = [sample(floor, lambda points: np.ones(len(points)), 2, rng, noise=1.0) for _ in range(2)]
-    fit = Fit(floor, halves[0].count, np.zeros(len(floor.cells), bool))
+    fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
     first, second = (fit.solve(fit.system(half), ALPHAS[0]) for half in halves)
     area = floor.cells.area
     alone = area @ fit.bending(first, first)
@@ -102,7 +102,7 @@ def test_the_stated_error_is_the_true_one(floor, noise):
     one = np.ones(len(floor.cells))
     for light in fronts(lambda t: np.clip(t / 0.1, 0, 1)):
         halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
-        fit = Fit(floor, halves[0].count, np.zeros(len(floor.cells), bool))
+        fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
         fitted = fit_halves(fit, halves, floor.cells.area, one)
         stated += floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
         true += squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)

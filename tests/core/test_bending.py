@@ -9,11 +9,11 @@ import pytest
 
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.patches import triangle_geometry
-from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.receivers import shared_edges
 from radiosity_baker.core.result import BakedObject
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.tessellation import triform, whole
 
 
 @pytest.fixture(scope="module")
@@ -39,14 +39,15 @@ def test_triangles_are_small_along_a_shadow_edge_and_large_elsewhere(shaded):
     assert len(area) <= 6000 + 6000 / 16 * 2
 
 
-def test_it_fits_better_than_as_many_triangles_of_one_size(shaded):
-    """Against the shadow itself, at random points of every triangle; even triangles may be half as many or twice."""
+def test_it_fits_better_than_ten_times_as_many_triangles_of_one_size(shaded):
+    """Against the shadow itself, at random points of every triangle; the even triangles are the mesh's own."""
     scene, settings = shaded
     adapted = bake(scene, settings).objects[0]
-    wanted = Settings(triangles=len(adapted.triangles), threads=2)
-    even = bake(scene, wanted, effort=replace(choose_effort(scene, wanted), coarsest=1.0, growth=0.0)).objects[0]
-    assert len(even.triangles) > len(adapted.triangles) / 2
-    assert squared_error(adapted) < squared_error(even) / 2
+    mesh = triform(whole(scene.objects[0].vertices, scene.objects[0].triangles), 0.1)
+    fine = replace(scene.objects[0], vertices=mesh.vertices, triangles=mesh.triangles, surface=mesh.parent * 0)
+    even = bake(replace(scene, objects=(fine, scene.objects[1])), replace(settings, tessellate=False)).objects[0]
+    assert len(even.triangles) > 10 * len(adapted.triangles)
+    assert squared_error(adapted) < squared_error(even)
 
 
 def squared_error(baked: BakedObject) -> float:

@@ -96,6 +96,8 @@ def shortfall_and_excess(result: BakedObject, body: SceneObject, *, sheet: bool)
     reach = np.repeat(np.sqrt(2 * area) / 4, len(grid()))[:, None] * facing
     covered = ~Visibility(faces).unblocked((points + 1e-6 * facing).astype(np.float32), (points + reach).astype("f4"))
     hidden = covered & (true < 0.5 * true.mean())
+    # Nobody sees a triangle that lies in a gap as a whole.
+    hidden |= np.repeat(covered.reshape(len(corners), -1).all(axis=1), len(grid()))
     if not sheet:
         outward = triangle_geometry(faces)[0]
         height = points @ outward.T - np.einsum("tk,tk->t", faces[:, 0], outward)

@@ -52,8 +52,8 @@ def sample(receivers, function, passes=6, valid=None, seed=0) -> Samples:
     return samples
 
 
-def fit_of(receivers, count) -> Fit:
-    return Fit(receivers, count, np.zeros(len(count), dtype=bool))
+def fit_of(receivers, lumped) -> Fit:
+    return Fit(receivers, lumped, np.zeros(len(lumped), dtype=bool))
 
 
 def at_vertices(receivers, function) -> np.ndarray:
@@ -79,7 +79,7 @@ def constant(points):
 def test_linear_light_is_reproduced_whatever_the_smoothing(build, alpha, tessellate):
     receivers = receive(build, build.quad(u=(2, 0, 0)), size=0.3, tessellate=tessellate)
     samples = sample(receivers, slope)
-    fit = fit_of(receivers, samples.count)
+    fit = fit_of(receivers, samples.lumped)
     solved = fit.solve(fit.system(samples), alpha)
     assert solved == pytest.approx(at_vertices(receivers, slope), abs=1e-7)
     assert samples.squared_residual(fit.at_corners(solved).mean(axis=2)).max() < 1e-12
@@ -90,7 +90,7 @@ def test_linear_light_is_reproduced_whatever_the_smoothing(build, alpha, tessell
 def test_constants_are_kept_on_every_surface(build, alpha):
     receivers = receive(build, build.box(), build.sphere(level=2, smooth=True), size=0.5)
     samples = sample(receivers, constant)
-    fit = fit_of(receivers, samples.count)
+    fit = fit_of(receivers, samples.lumped)
     assert fit.solve(fit.system(samples), alpha) == pytest.approx(constant(np.zeros((receivers.vertices, 3))))
 
 
@@ -104,7 +104,7 @@ def test_the_mean_of_the_samples_is_kept(floor, alpha):
     """Constants jump nowhere, so 1'(M + alpha R) = 1'M and the sum of M x is that of b: what the interpolated light is
     at the sample points, weighted by the cells' areas, is on average what the samples are."""
     samples = sample(floor, noise)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     system = fit.system(samples)
     weight = floor.cells.area / samples.count
     sampled = np.einsum("c,cik->k", weight, samples.light)
@@ -118,7 +118,7 @@ def test_the_mean_of_the_samples_is_kept(floor, alpha):
 @pytest.mark.usefixtures("exactly")
 def test_without_smoothing_no_other_values_are_nearer_to_the_samples(floor):
     samples = sample(floor, noise).grey()
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     best = fit.solve(fit.system(samples), 0.0)
     area = floor.cells.area
 
@@ -133,7 +133,7 @@ def test_without_smoothing_no_other_values_are_nearer_to_the_samples(floor):
 @pytest.mark.usefixtures("exactly")
 def test_more_smoothing_jumps_less(floor):
     samples = sample(floor, noise)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     jumps = gradient_jumps(floor, fit.measured)
     system = fit.system(samples)
 
@@ -173,7 +173,7 @@ def test_the_system_is_what_least_squares_says(build):
     for tessellate in (True, False):
         receivers = receive(build, build.quad(u=(2, 0, 0)), build.box(), size=0.6, tessellate=tessellate)
         samples = sample(receivers, noise).grey()
-        fit = fit_of(receivers, samples.count)
+        fit = fit_of(receivers, samples.lumped)
         corner = receivers.corner_vertex[receivers.cells.element]
         dense = np.zeros((receivers.vertices, receivers.vertices))
         weight = receivers.cells.area / samples.count
@@ -197,7 +197,7 @@ def test_light_does_not_bleed_over_hard_edges(build):
         return np.where(top[:, None], 7.0, 0.0) * np.ones((len(points), 1))
 
     samples = sample(receivers, light)
-    fit = fit_of(receivers, samples.count)
+    fit = fit_of(receivers, samples.lumped)
     shown = fit.at_corners(fit.solve(fit.system(samples), 1.0))
     assert shown[top] == pytest.approx(7.0, rel=1e-3)
     assert np.abs(shown[~top]).max() == 0
@@ -207,7 +207,7 @@ def test_vertices_without_a_sample_are_filled_from_their_neighbours(floor):
     """The hole takes values between the lowest and the highest around it."""
     valid = np.linalg.norm(floor.cells.corners.mean(axis=1) - [0.1, 0.0, 0], axis=1) > 0.45
     samples = sample(floor, lambda points: 5.0 + 0.5 * slope(points), valid=valid)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     filled = fit.fill(fit.solve(fit.system(samples), 0.05))
     assert 0 < np.count_nonzero(~fit.measured) < floor.vertices
     known = filled[fit.measured]
@@ -221,7 +221,7 @@ def test_a_filled_vertex_is_the_mean_of_its_neighbours(build):
     rim = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     fan = build.triangles("fan", [(0, 0, 0), *rim], [(0, k + 1, (k + 1) % 6 + 1) for k in range(6)])
     receivers = receive(build, fan, size=10.0)
-    fit = fit_of(receivers, np.ones(6))
+    fit = fit_of(receivers, np.ones((6, 3)))
     centre = receivers.corner_vertex[0, 0]
     fit.measured = np.arange(7) != centre
     values = np.arange(7.0)[:, None].copy()
@@ -277,7 +277,7 @@ def covered(floor, radius):
     """Cells whose middle lies within a round solid that stands on the floor, and the fit of an even light beside it."""
     inside = np.linalg.norm(floor.cells.corners.mean(axis=1) - [0.1, 0.0, 0], axis=1) < radius
     samples = sample(floor, lambda points: np.full((len(points), 1), 5.0), valid=~inside)
-    fit = Fit(floor, samples.count, samples.tried > samples.count)
+    fit = Fit(floor, samples.lumped, samples.tried > samples.count)
     return inside, fit, fit.solve_within(fit.system(samples), 0.05, fit.limits(samples))
 
 
@@ -307,7 +307,7 @@ def test_no_vertex_is_brighter_or_darker_than_the_light_around_it(floor):
         return np.where(points[:, :1] > 0.13, 3.0, 1.0)
 
     samples = sample(floor, step, passes=12)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     system = fit.system(samples)
     free, within = fit.solve(system, 0.02), fit.solve_within(system, 0.02, fit.limits(samples))
     assert free.max() > 3.05
@@ -340,6 +340,6 @@ def test_limits_keep_the_mean_of_light_that_few_samples_find(floor):
 def test_the_limits_leave_linear_light_alone(floor):
     """To the rim, where no sample is as bright or as dark as the vertex."""
     samples = sample(floor, lambda points: 10.0 + slope(points), passes=12)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     within = fit.solve_within(fit.system(samples), 0.02, fit.limits(samples))
     assert within == pytest.approx(at_vertices(floor, lambda points: 10.0 + slope(points)), abs=1e-6)

@@ -59,9 +59,9 @@ def test_a_shadow_edge_is_nearer_than_by_corner_sampling_and_near_the_best(build
     every = np.zeros(len(receivers.cells), dtype=bool)
     halves = [sampled(receivers, light, 16, seed) for seed in (0, 1)]
     area = receivers.cells.area
-    ours = fit_halves(Fit(receivers, halves[0].count, every), halves, area, np.ones(len(area))).grey
+    ours = fit_halves(Fit(receivers, halves[0].lumped, every), halves, area, np.ones(len(area))).grey
     dense = sampled(receivers, light, 200, 9)
-    fit = Fit(receivers, dense.count, every)
+    fit = Fit(receivers, dense.lumped, every)
     best = fit.solve(fit.system(dense), 0.0)[:, 0]
     corners = np.zeros(receivers.vertices)
     corners[receivers.corner_vertex] = light(receivers.element_corners.reshape(-1, 3)).reshape(-1, 3)

@@ -1,0 +1,306 @@
+"""Triangles cut along the edges of shadows and along the outlines of what stands on a surface.
+
+A step of the light that runs through triangles cannot be shown by linear elements: it becomes a ramp as wide as they
+are, with teeth. Cut along the step (discontinuity meshing: Heckbert 1992; Lischinski, Tampieri, Greenberg 1992), and
+with values of its own on either side, the light is linear again, whatever the size of the triangles. The shadow of a
+light with size is cut twice, where it begins and where it is full: between the two is a strip of triangles.
+
+Neighbouring cells that have other lights in view are where contours are looked for, and from there they are followed
+from edge to edge. On an edge, bisection finds the place. A shadow that is soft over much of an edge is left alone, for
+triangles of this size show it.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .convexity import nothing_stands_between
+from .direct.illumination import MOST_ASKED, DirectLight
+from .gather import Points, gather_direct, gather_indirect
+from .parallel import Workers
+from .receivers import Receivers, cut_cells, numbered_edges, shared_edges
+from .sampling import stream
+from .scene import Bool, Float64, Scene
+from .survey import Surroundings
+from .tessellation import Int64
+from .visibility import offset_along
+
+#: Where edges are looked at, from one end to the other; and how far inside the triangle, relative to its height.
+_PLACES = np.array([0.02, 0.26, 0.5, 0.74, 0.98])
+_ASIDE = 2e-4
+#: Halvings that find a place on an edge; how often the pieces are looked at again, for more than one contour.
+_HALVINGS, _PASSES = 10, 4
+#: A cut nearer to an end than this, relative to the uncut cell, is none: it would leave a sliver.
+_SNAP = 0.015
+#: How far within what is covered a cut is put, relative to that: a little of its dark would show.
+_WITHIN = 0.5
+#: A shadow is sharp when light changes by this share of its whole change within so much of the edge to either side; it
+#: counts when that is this share of the light.
+_SHARP, _BESIDE, _CONTRAST = 0.7, 0.25, 0.1
+#: What stands on a surface, however thin, counts when light differs by this share on its two sides.
+_PARTED = 0.5
+#: How far beside a side of a cell, relative to its height, it shows what is on either side.
+_BESIDE_SIDE = 0.1
+#: Something that lies within this share of an edge's length above it covers it.
+_GAP = 0.25
+#: Rays that tell how much light there is, and whether a point is inside a solid.
+_SHADOW_RAYS, _RAYS = 8, 16
+#: The ends of a way along a surface are left out, lest it meets what bounds the surface.
+_BARRED_UP_TO = 0.98
+#: Points in a chunk; a number of streams that nothing else uses.
+_CHUNK, _STREAM = 8192, 4_000_000
+#: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
+#: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
+_WHOLE, _BARRED, _COVERED = MOST_ASKED, 1 << 2 * MOST_ASKED, 1 << 2 * MOST_ASKED + 1
+
+
+@dataclass(frozen=True, eq=False)
+class _Edges:
+    """Edges of cells (e,): a cell that each belongs to; weights (e, 3) there of its first end, of its second and of the
+    corner opposite; length in the unit box."""
+
+    cell: Int64
+    first: Float64
+    second: Float64
+    opposite: Float64
+    length: Float64
+
+    @classmethod
+    def of(cls, receivers: Receivers, number: Int64) -> _Edges:
+        """Each edge by the first cell that has it; from its vertex with the lower number to the other."""
+        side = np.unique(number, return_index=True)[1]
+        cell, corner = side // 3, side % 3
+        vertex, each = receivers.cell_vertex[cell], np.arange(len(side))
+        turned = vertex[each, corner] > vertex[each, (corner + 1) % 3]
+        one, other = (corner + turned) % 3, (corner + ~turned) % 3
+        corners, unit = receivers.cells.corners[cell], np.eye(3)
+        length = np.linalg.norm(corners[each, one] - corners[each, other], axis=1)
+        return cls(cell, unit[one], unit[other], unit[(corner + 2) % 3], length)
+
+    def only(self, chosen: Int64) -> _Edges:
+        return _Edges(
+            self.cell[chosen], self.first[chosen], self.second[chosen], self.opposite[chosen], self.length[chosen]
+        )
+
+    def weights(self, place: Float64) -> Float64:
+        """Weights (e, 3) of the places (e,) from the first end to the second, a little to the inside of the cell."""
+        along = place[:, None]
+        return (1.0 - _ASIDE) * ((1.0 - along) * self.first + along * self.second) + _ASIDE * self.opposite
+
+
+@dataclass(frozen=True, eq=False)
+class _Look:
+    """Around points (n,): the indirect light; which of them are inside a solid or have something close above them; and
+    which have nothing within twice that, so that between the two there is an outline and not a slope."""
+
+    light: Float64
+    hidden: Bool
+    open: Bool
+
+    def differs(self, other: _Look) -> Bool:
+        """Whether one is hidden and the other open (n,)."""
+        return np.asarray((self.hidden & other.open) | (other.hidden & self.open))
+
+
+class Contours:
+    """Cuts cells along the contours of lights and solids. rays: cast so far, by purpose."""
+
+    def __init__(
+        self, scene: Scene, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers
+    ) -> None:
+        self.rays: Counter[str] = Counter()
+        self._light = direct_light
+        shading = [light for light in direct_light.lights if light.casts_shadow]
+        self._lights = bool(shading) and len(direct_light.lights) <= MOST_ASKED
+        self._nothing_to_find = (not self._lights and around is None) or nothing_stands_between(scene)
+        self._around = around and replace(
+            around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "contour patterns"))
+        )
+        self._seed = seed
+        self._workers = workers
+
+    def cut(self, receivers: Receivers) -> tuple[Receivers, Int64]:
+        """The receivers with cells cut along the contours; and for each cell the one it came from."""
+        source = np.arange(len(receivers.cells))
+        if self._nothing_to_find:
+            return receivers, source
+        near = self._borders(receivers)
+        size = np.sqrt(2.0 * receivers.cells.area)
+        contoured = np.zeros(len(source), dtype=bool)
+        for _ in range(_PASSES):
+            if not near.any():
+                break
+            number, ends = numbered_edges(receivers.cell_vertex)
+            edges = _Edges.of(receivers, number)
+            crossed, place, inward = self._follow(receivers, edges, number, near)
+            margin = _SNAP * size[source[edges.cell[crossed]]] / edges.length[crossed]
+            place = _off_the_ends(place + _WITHIN * margin * inward, inward, margin)
+            contoured |= np.isin(number, crossed).any(axis=1)
+            at = np.full(len(ends), np.nan)
+            at[crossed] = place
+            receivers, piece = cut_cells(receivers, at[number])
+            near, contoured, source = np.isfinite(at[number]).any(axis=1)[piece], contoured[piece], source[piece]
+        if contoured.any():
+            receivers = replace(receivers, breaks=self._breaks(receivers, contoured))
+        return receivers, source
+
+    def _borders(self, receivers: Receivers) -> Bool:
+        """Cells (c,) with others around them that have other lights in sight, or that are covered."""
+        cells, corner = receivers.cells, receivers.cell_vertex
+        points = Points(cells, np.arange(len(cells)), np.full((len(cells), 3), 1 / 3))
+        sight = self._sight(points, _GAP * points.size)
+        low, high = np.full((2, int(corner.max()) + 1), sight[0])
+        for k in range(3):
+            low[corner[:, k]] = high[corner[:, k]] = sight
+        for k in range(3):
+            np.minimum.at(low, corner[:, k], sight)
+            np.maximum.at(high, corner[:, k], sight)
+        near = (low != high)[corner].any(axis=1)
+        for k in range(3):
+            near |= self._barred(points, cells.corners[:, k])
+        return np.asarray(near)
+
+    def _follow(self, receivers: Receivers, edges: _Edges, number: Int64, near: Bool) -> tuple[Int64, Float64, Int64]:
+        """Edges (n,) that contours cross, followed from the near (c,) cells on; see `_crossings`."""
+        known = np.zeros(len(edges.cell), dtype=bool)
+        found = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64))]
+        while near.any():
+            fresh = np.unique(number[near])
+            fresh = fresh[~known[fresh]]
+            known[fresh] = True
+            some, place, inward = self._crossings(receivers, edges.only(fresh))
+            shadow, contact = self._matter(receivers, edges.only(fresh[some]), place)
+            matters = shadow | contact
+            found.append((fresh[some][matters], place[matters], (contact * inward)[matters]))
+            meets = np.zeros(len(known), dtype=bool)
+            meets[found[-1][0]] = True
+            near = meets[number].any(axis=1)
+        crossed, places, inwards = (np.concatenate(part) for part in zip(*found, strict=True))
+        return crossed, places, inwards
+
+    def _crossings(self, receivers: Receivers, edges: _Edges) -> tuple[Int64, Float64, Int64]:
+        """Edges (n,) along which what is in sight changes, the first place (n,) of each where it does, and where from
+        there (n,) what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side."""
+        seen = np.stack([self._on_edges(receivers, edges, np.full(len(edges.cell), place)) for place in _PLACES])
+        changes = seen[1:] != seen[:-1]
+        crossed = np.flatnonzero(changes.any(axis=0))
+        step = changes[:, crossed].argmax(axis=0)
+        low, high, before = _PLACES[step], _PLACES[step + 1], seen[step, crossed]
+        edges = edges.only(crossed)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2.0
+            same = self._on_edges(receivers, edges, middle) == before
+            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        after = self._on_edges(receivers, edges, high)
+        inward = (after >= _COVERED).astype(np.int64) - (before >= _COVERED)
+        return crossed, (low + high) / 2.0, inward
+
+    def _on_edges(self, receivers: Receivers, edges: _Edges, place: Float64) -> Int64:
+        start = Points(receivers.cells, edges.cell, edges.weights(np.full(len(place), _PLACES[0])))
+        points = Points(receivers.cells, edges.cell, edges.weights(place))
+        return self._sight(points, _GAP * edges.length) + _BARRED * self._barred(start, points.positions)
+
+    def _barred(self, points: Points, targets: Float64) -> Bool:
+        """Whether something stands on the surface between points and targets (n, 3) on it."""
+        origins = offset_along(points.positions, points.normals)
+        ways = (_BARRED_UP_TO * (targets - points.positions)).astype(np.float32)
+        long = np.flatnonzero(np.einsum("nk,nk->n", ways, ways) > 0)
+        barred = np.zeros(len(targets), dtype=bool)
+        barred[long] = ~self._light.visibility.unblocked_along(origins[long], ways[long])
+        self.rays["contact"] += len(long)
+        return barred
+
+    def _sight(self, points: Points, reach: Float64 | None) -> Int64:
+        """What is in sight (n,) of each point; with a reach (n,), also whether it is covered."""
+
+        def work(_: int, part: slice) -> tuple[Int64, Counter[str]]:
+            where = points.positions[part], points.normals[part]
+            sight, rays = np.zeros(len(where[0]), dtype=np.int64), Counter[str]()
+            if self._lights:
+                some, whole, rays["shadow"] = self._light.shadows(*where)
+                sight = some | whole << _WHOLE
+            if reach is not None and self._around is not None:
+                looks = self._around.hemispheres
+                sight += _COVERED * (looks.inside(*where) | looks.covered(*where, reach[part]))
+                rays["contact"] += 2 * len(sight)
+            return sight, rays
+
+        found = [*self._workers.map(work, len(points.positions), _CHUNK)]
+        self.rays += sum((rays for _, rays in found), Counter())
+        return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
+
+    def _matter(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Bool, Bool]:
+        """Which of the crossed edges (e,) a sharp shadow crosses, and which the outline of what hides one side."""
+        if not len(place):
+            return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+        low, high = np.full(len(place), _PLACES[0]), np.full(len(place), _PLACES[-1])
+        light, looks, beside = [], [], []
+        for k, where in enumerate([low, np.maximum(place - _BESIDE, low), np.minimum(place + _BESIDE, high), high]):
+            points = Points(receivers.cells, edges.cell, edges.weights(where))
+            found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM + k, self._workers)
+            self.rays += found.rays
+            light.append(found.irradiance.mean(axis=1))
+            if 0 < k < 3:
+                beside.append(points)
+                looks.append(self._look(points, _GAP * edges.length, k))
+        step = np.abs(light[2] - light[1])
+        sharp = (step > _SHARP * np.abs(light[3] - light[0])) & (step > _CONTRAST * np.maximum(light[1], light[2]))
+        one, other = light[1] + looks[0].light, light[2] + looks[1].light
+        parted = self._barred(beside[0], beside[1].positions)
+        parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
+        return np.asarray(sharp | parted), looks[0].differs(looks[1])
+
+    def _look(self, points: Points, reach: Float64, number: int) -> _Look:
+        """Looks around from points (n,), of which something within reach (n,) above them hides the light."""
+        around = self._around
+        if around is None:
+            none = np.zeros(len(reach), dtype=bool)
+            return _Look(np.zeros(len(reach)), none, ~none)
+        table = around.tables[0][:, : len(around.to_grey)]
+        arriving, _, enclosed, rays = gather_indirect(
+            points, around.hemispheres, table, self._seed, _STREAM + number, self._workers
+        )
+        near, far = (
+            around.hemispheres.covered(points.positions, points.normals, times * reach) for times in (1.0, 2.0)
+        )
+        self.rays += rays + Counter(contact=2 * len(reach))
+        return _Look(arriving @ around.to_grey, enclosed | near, ~enclosed & ~far)
+
+    def _breaks(self, receivers: Receivers, near: Bool) -> Bool:
+        """Sides (c, 3) of near (c,) cells with a light that is in sight as a whole on one side and hidden on the other,
+        with an outline between them, or with something that stands between them."""
+        here, there = shared_edges(receivers.cell_vertex)
+        both = near[here[:, 0] // 3] & near[there[:, 0] // 3]
+        sides = np.stack([here[both, 0], _side(there[both])])
+        beside, sight, looks = [], [], []
+        for k, side in enumerate(sides):
+            each = np.arange(len(side))
+            weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
+            weights[each, (side + 2) % 3] = _BESIDE_SIDE
+            points = Points(receivers.cells, side // 3, weights)
+            beside.append(points)
+            sight.append(self._sight(points, None))
+            looks.append(self._look(points, _GAP * points.size, 4 + k))
+        one, other = sight
+        parted = self._barred(beside[0], beside[1].positions)
+        jumps = (one >> _WHOLE & ~other | other >> _WHOLE & ~one) & ((1 << _WHOLE) - 1)
+        breaks = np.zeros(3 * len(near), dtype=bool)
+        breaks[sides[:, (jumps > 0) | looks[0].differs(looks[1]) | parted]] = True
+        return breaks.reshape(-1, 3)
+
+
+def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:
+    """Places (n,) at least so far (n,) from both ends of their edges; nan where there is no such place, or none is
+    needed. What is covered may be cut off late, but not early: then its dark would show."""
+    first, second = place < margin, place > 1.0 - margin
+    place = np.where(first & (inward > 0), margin, np.where(second & (inward < 0), 1.0 - margin, place))
+    return np.where((place < margin) | (place > 1.0 - margin) | (margin > 0.4), np.nan, place)
+
+
+def _side(ends: Int64) -> Int64:
+    """The side (n,), 3 t + i from corner i to the next, whose ends are two corners (n, 2) of a triangle t."""
+    first, second = ends.T
+    return np.where((first % 3 + 1) % 3 == second % 3, first, second)
