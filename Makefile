@@ -8,12 +8,13 @@
 # make accuracy    measure the samples against Cycles, for docs/accuracy.md: takes long
 # make bench       measure speed and honesty on six scenes beside Cycles, for docs/speed.md: takes 20 minutes
 # make effects     measure every effect against Cycles, for docs/effects.md
+# make colours     measure vertex colours beside Cycles' and the best fit, for docs/vertex_colours.md
 # make fuzz        try thousands of random scenes, and a thousand faults of each kind: takes hours
 # make reliability run the hard cases on each Blender that has an environment here, for docs/reliability.md
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-own test-other test-3.13 test-4.5 lint samples extension repository accuracy bench effects fuzz reliability test-gui clean
+.PHONY: bake test test-own test-other test-3.13 test-4.5 lint samples extension repository accuracy bench effects colours fuzz reliability test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
@@ -71,6 +72,9 @@ bench: .venv/ready
 
 effects: .venv/ready
 	.venv/bin/python -m radiosity_baker.docs.effects
+
+colours: .venv/ready
+	.venv/bin/python -m radiosity_baker.docs.colours
 
 fuzz: .venv/ready
 	.venv/bin/python -m pytest --quiet tests/hard_cases --hypothesis-profile=fuzz

@@ -40,6 +40,8 @@ _WITHIN = 0.5
 #: A shadow is sharp when light changes by this share of its whole change within so much of the edge to either side; it
 #: counts when that is this share of the light.
 _SHARP, _BESIDE, _CONTRAST = 0.7, 0.25, 0.1
+#: Standard deviations of the noise that a change of light must exceed.
+_SIGNIFICANT = 4.0
 #: What stands on a surface, however thin, counts when light differs by this share on its two sides.
 _PARTED = 0.5
 #: How far beside a side of a cell, relative to its height, it shows what is on either side.
@@ -115,7 +117,9 @@ class Contours:
         self._light = direct_light
         shading = [light for light in direct_light.lights if light.casts_shadow]
         self._lights = bool(shading) and len(direct_light.lights) <= MOST_ASKED
-        self._nothing_to_find = (not self._lights and around is None) or nothing_stands_between(scene)
+        # A sheet may lie close above another, and still nothing stand between either and a lamp.
+        alone = len(scene.objects) == 1 and nothing_stands_between(scene)
+        self._nothing_to_find = alone or (not self._lights and around is None)
         self._around = around and replace(
             around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "contour patterns"))
         )
@@ -182,17 +186,20 @@ class Contours:
         return crossed, places, inwards
 
     def _crossings(self, receivers: Receivers, edges: _Edges) -> tuple[Int64, Float64, Int64]:
-        """Edges (n,) along which what is in sight changes, the first place (n,) of each where it does, and where from
+        """Edges (n,) along which what is in sight changes, a place (n,) of each where it does, and where from
         there (n,) what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side."""
         seen = np.stack([self._on_edges(receivers, edges, np.full(len(edges.cell), place)) for place in _PLACES])
-        changes = seen[1:] != seen[:-1]
+        changes = seen[1:] ^ seen[:-1]
         crossed = np.flatnonzero(changes.any(axis=0))
-        step = changes[:, crossed].argmax(axis=0)
+        # Where something is covered, that is all that counts.
+        outline = changes[:, crossed] >= _COVERED
+        counts = np.where(outline.any(axis=0), _COVERED, -1)
+        step = ((changes[:, crossed] & counts) != 0).argmax(axis=0)
         low, high, before = _PLACES[step], _PLACES[step + 1], seen[step, crossed]
         edges = edges.only(crossed)
         for _ in range(_HALVINGS):
             middle = (low + high) / 2.0
-            same = self._on_edges(receivers, edges, middle) == before
+            same = ((self._on_edges(receivers, edges, middle) ^ before) & counts) == 0
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         after = self._on_edges(receivers, edges, high)
         inward = (after >= _COVERED).astype(np.int64) - (before >= _COVERED)
@@ -237,17 +244,19 @@ class Contours:
         if not len(place):
             return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
         low, high = np.full(len(place), _PLACES[0]), np.full(len(place), _PLACES[-1])
-        light, looks, beside = [], [], []
+        light, noise, looks, beside = [], [], [], []
         for k, where in enumerate([low, np.maximum(place - _BESIDE, low), np.minimum(place + _BESIDE, high), high]):
             points = Points(receivers.cells, edges.cell, edges.weights(where))
             found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM + k, self._workers)
             self.rays += found.rays
             light.append(found.irradiance.mean(axis=1))
+            noise.append(np.sqrt(found.variance).mean(axis=1))
             if 0 < k < 3:
                 beside.append(points)
                 looks.append(self._look(points, _GAP * edges.length, k))
         step = np.abs(light[2] - light[1])
         sharp = (step > _SHARP * np.abs(light[3] - light[0])) & (step > _CONTRAST * np.maximum(light[1], light[2]))
+        sharp &= step > _SIGNIFICANT * np.hypot(noise[1], noise[2])
         one, other = light[1] + looks[0].light, light[2] + looks[1].light
         parted = self._barred(beside[0], beside[1].positions)
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)

@@ -329,7 +329,7 @@ def test_limits_keep_the_mean_of_light_that_few_samples_find(floor):
     the limits add left where it is, 46 % too much."""
     rng = np.random.default_rng(3)
     samples = sample(floor, lambda points: 100.0 * (rng.random((len(points), 2)) < 0.02), passes=2)
-    fit = fit_of(floor, samples.count)
+    fit = fit_of(floor, samples.lumped)
     system = fit.system(samples)
     values = fit.solve_within(system, ALPHAS[0], fit.limits(samples))
     assert values.min() >= 0.0

@@ -164,13 +164,14 @@ def furnace(bodies: list[SceneObject], scale: float = 1.0, offset: float = 0.0) 
 
 
 def swallowed(corners: np.ndarray, bodies: Sequence[SceneObject]) -> np.ndarray:
-    """Triangles (t, 3, 3) that lie as a whole within what two crossing boxes have in common, where no light is."""
+    """Triangles (t, 3, 3) that lie as a whole within what two boxes have in common that cross or touch: where no light
+    is."""
     inside = np.zeros(len(corners), dtype=bool)
     bounds = [(o.vertices.min(axis=0), o.vertices.max(axis=0)) for o in bodies if len(o.vertices) == 8]
     for (low, high), (other_low, other_high) in combinations(bounds, 2):
         common = np.maximum(low, other_low), np.minimum(high, other_high)
         nested = any(np.array_equal(common, b) for b in ((low, high), (other_low, other_high)))
-        if not nested and (common[0] < common[1]).all():
+        if not nested and (common[0] <= common[1]).all():
             inside |= ((corners > common[0] - 1e-6) & (corners < common[1] + 1e-6)).all(axis=(1, 2))
     return inside
 
