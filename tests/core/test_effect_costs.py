@@ -83,7 +83,7 @@ def test_a_scene_without_effects_calls_nothing_that_works_for_them(build, monkey
     for work, _ in WORK.values():
         refuse(monkeypatch, work)
     rays = bake(scene(build), QUICK).report.rays
-    assert set(rays) == {"total", "shadow", "gather", "transport"}
+    assert set(rays) == {"total", "shadow", "contact", "gather", "transport"}
 
 
 @pytest.mark.parametrize("effect", WORK)
