@@ -547,8 +547,8 @@ SENTENCES |= {
     "GB belegen: größere oder weniger Dreiecke wählen; mehr als {most} gehen nicht.",
     "The scene has more than {number} triangles, with all instances, and {free} MB of memory are free: hide from "
     "rendering what the light does not need, or lower subdivisions and the number of instances.": "Die Szene hat mit "
-    "allen Instanzen mehr als {number} Dreiecke, und {free} MB Speicher sind frei: beim Rendern verbergen, was das Licht "
-    "nicht braucht, oder Unterteilungen und Zahl der Instanzen senken.",
+    "allen Instanzen mehr als {number} Dreiecke, und {free} MB Speicher sind frei: beim Rendern verbergen, was das "
+    "Licht nicht braucht, oder Unterteilungen und Zahl der Instanzen senken.",
     "This bake would need about {needed} MB of memory, and {free} MB are free: ask for fewer triangles or a larger "
     "error, or close other programs.": "Dieses Backen brauchte etwa {needed} MB Speicher, und {free} MB sind frei: "
     "weniger Dreiecke oder einen größeren Fehler verlangen, oder andere Programme schließen.",
