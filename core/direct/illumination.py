@@ -22,8 +22,8 @@ _NEGLIGIBLE = 1e-7
 _RIM = np.array([[0.98, 0.98, 0.98, 0.98], [0.0, 0.25, 0.5, 0.75]], dtype=np.float32)
 _CORNERS = np.array([[0.01, 0.99, 0.99, 0.01], [0.01, 0.01, 0.99, 0.99]], dtype=np.float32)
 #: Of more lights than this, each half of the rays asks so many at a point. Noise falls much faster with this number
-#: than time grows: most of the time goes into the closed forms of all lights.
-MOST_ASKED = 48
+#: than time grows, up to about here: then rays cost more than the closed forms of all lights.
+MOST_ASKED = 24
 
 
 @dataclass(frozen=True, eq=False)
