@@ -245,7 +245,9 @@ class DirectLight:
         """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (3, k) of the light passes,
         or None where that is all; and the rays it took. Rays start a hair off the surface, and must not end as much
         beyond their targets: a lamp that is a surface would be in its own way."""
-        ways = np.ascontiguousarray((towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]).T)
+        ways = towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]
+        # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
+        ways = np.ascontiguousarray(ways.T, dtype=np.float32)
         origins = receivers.origins[point]
         unblocked = self.visibility.unblocked_along(origins, ways)
         rays = Counter(shadow=len(sample))
