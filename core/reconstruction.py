@@ -24,6 +24,8 @@ _NOISY = 5.0
 _ENDLESS = 1e100
 #: How much light limits may add or take in all, relatively, before it is passed on, and how far it is.
 _ADDED, _MOST_RINGS = 5e-3, 30
+#: What is nothing beside the rest.
+_WEIGHTLESS = 1e-12
 #: Samples that together weigh less than this at a vertex, where one has a third on average, say nothing of it.
 _MEASURED = 0.02
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
@@ -190,23 +192,26 @@ class Fit:
 
         added (v, k): light times weight, weight (v,): how much of the surface each vertex stands for.
         """
+        heavy = weight > _WEIGHTLESS * weight.max(initial=0.0)
+        weight = np.where(heavy, weight, 0.0)[:, None]
+        inverse = np.where(heavy[:, None], 1.0 / np.where(heavy[:, None], weight, 1.0), 0.0)
         one, two = self._neighbours()
-        open_edges = (weight[one] > 0) & (weight[two] > 0)
+        open_edges = heavy[one] & heavy[two]
         one, two = one[open_edges], two[open_edges]
         sharing = np.maximum(np.bincount(one, minlength=self._count), 1)[:, None]
-        weight = np.maximum(weight, np.finfo(float).tiny)[:, None]
         enough = _ADDED * np.abs(np.sum(weight * values, axis=0))
         for _ in range(_MOST_RINGS):
             if (np.abs(added).sum(axis=0) <= enough).all():
                 break
-            fresh = np.clip(values - added / weight, low, high)
+            fresh = np.clip(values - added * inverse, low, high)
             share = (added + weight * (fresh - values)) / sharing
             added = np.stack([np.bincount(two, channel[one], self._count) for channel in share.T], axis=1)
             values = fresh
         else:
             # So few places are lit that nothing near takes it: all of them share the rest.
-            total = np.maximum(np.sum(weight * values, axis=0), np.finfo(float).tiny)
-            values = values * np.maximum(1.0 - added.sum(axis=0) / total, 0.0)
+            total, rest = np.sum(weight * values, axis=0), added.sum(axis=0)
+            lit = total > _WEIGHTLESS * np.abs(rest)
+            values = values * np.maximum(1.0 - np.divide(rest, total, out=np.zeros_like(rest), where=lit), 0.0)
         return values
 
     def _averages(self, system: System) -> Float64:

@@ -40,7 +40,7 @@ def main() -> None:
 
 def _version(python: Path) -> str:
     said = subprocess.run(  # noqa: S603 - this repository's own environment
-        [python, "-c", "import bpy; print(bpy.app.version_string)"], capture_output=True, text=True, check=True
+        [python, "-c", "import bpy; print(*bpy.app.version, sep=chr(46))"], capture_output=True, text=True, check=True
     )
     return said.stdout.split()[-1]
 
