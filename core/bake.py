@@ -131,7 +131,7 @@ def finer_where_it_matters(
     """Triangles cut where light breaks, and split where it bends if they start coarse; and the rays it took to tell.
     Meshes that are kept are sampled more finely where light breaks."""
     contours = Contours(scene, direct_light, surroundings, seed, workers)
-    if effort.coarsest > 1:
+    if effort.coarsest > 1 and receivers.tessellated:
         bends = Bends(direct_light, surroundings, contours, effort, seed, workers)
         receivers = bends.refine(scene, receivers, len(receivers.cells) + effort.triangles)
         return receivers, bends.rays + contours.rays

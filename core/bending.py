@@ -14,6 +14,7 @@ import numpy as np
 
 from .contours import Contours
 from .direct.illumination import DirectLight
+from .gather import Points
 from .parallel import Workers
 from .patches import Cells
 from .plan import Effort
@@ -21,7 +22,7 @@ from .receivers import Receivers, split_cells
 from .refinement import fit_samples
 from .sampling import stream, subseed
 from .scene import Bool, Scene
-from .survey import Surroundings, Survey
+from .survey import GAP, Surroundings, Survey
 from .tessellation import Int64
 
 #: How often cells are split at most; passes over them before each time, and rays of each point that look around.
@@ -86,4 +87,20 @@ class Bends:
         wanted = int(np.count_nonzero(left > allowed)) + 1 if squared.sum() > allowed else 0
         chosen = np.zeros(len(cells), dtype=bool)
         chosen[order[: min(wanted, room)]] = True
-        return np.asarray(chosen & large & (squared > 0.0))
+        chosen &= squared > 0.0
+        chosen[source[self._over_gaps(survey)]] = True
+        return np.asarray(chosen & large)
+
+    def _over_gaps(self, survey: Survey) -> Int64:
+        """Cells of the survey that are too large for the gap that they bound: what samples there see counts for
+        nothing, but finer cells will see it. Where the gap is too narrow for the finest as well, they stay as they are.
+        """
+        hidden = np.flatnonzero(survey.invalid)
+        if self._around is None or not len(hidden):
+            return hidden[:0]
+        looks = self._around.hemispheres
+        points = Points(survey.receivers.cells, hidden, np.full((len(hidden), 3), 1 / 3))
+        where = points.positions, points.normals
+        bounds, closed = (looks.covered(*where, reach * points.size) for reach in (GAP, GAP / 2**_ROUNDS))
+        self.rays["contact"] += 3 * len(hidden)
+        return hidden[bounds & ~closed & ~looks.inside(*where)]

@@ -29,7 +29,7 @@ from .visibility import Visibility
 
 #: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
 #: cell's size, one that gets less than half.
-_DARK, _DIM, _GAP = 0.05, 0.5, 0.25
+_DARK, _DIM, GAP = 0.05, 0.5, 0.25
 #: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
 _LIT = 0.25
 
@@ -132,7 +132,7 @@ def out_of_sight(
         hidden[doubtful] = look(points.only(doubtful)) <= _LIT * mean
     dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
     if len(dim):
-        hidden[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], _GAP * points.size[dim])
+        hidden[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], GAP * points.size[dim])
     return np.asarray(hidden)
 
 

@@ -125,7 +125,8 @@ class DirectLight:
             towards = light.aim(along[0][:, lit], np.repeat(rim, len(lit), axis=2)).towards
             below = (towards * along[1][:, None, lit]).sum(axis=0) <= 0
             ways = (towards - np.float32(OFFSET) * along[1][:, None, lit]).transpose(1, 2, 0).reshape(-1, 3)
-            free = self.visibility.unblocked_along(np.tile(origins[lit], (len(below), 1)), np.ascontiguousarray(ways))
+            ways = np.ascontiguousarray(ways, dtype=np.float32)
+            free = self.visibility.unblocked_along(np.tile(origins[lit], (len(below), 1)), ways)
             hidden = ~free.reshape(below.shape) & ~below
             some[lit] |= hidden.any(axis=0).astype(np.int64) << number
             whole[lit] |= (hidden | below).all(axis=0).astype(np.int64) << number

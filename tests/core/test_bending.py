@@ -77,3 +77,21 @@ def test_even_light_needs_no_more_triangles_than_at_the_start(build):
     lamp = PointLamp("lamp", (0.5, 0.5, 30.0), (100.0, 100.0, 100.0))
     result = bake(Scene((build.quad(),), (build.grey,), (lamp,)), Settings(triangles=5000, error=0.02, threads=2))
     assert len(result.objects[0].triangles) < 5000 / 8
+
+
+def test_coarse_triangles_over_a_gap_get_fine_enough_to_look_into_it(build):
+    """The underside of a box a tenth of its breadth above the ground is as dark with few triangles as with many. A
+    coarse triangle takes the ground for a thing that lies on it, and would be filled from anywhere."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    chest = build.box("chest", (-0.5, -0.5, 0.1), (0.5, 0.5, 0.7))
+    lamp = PointLamp("lamp", (0.3, 0.2, 3.0), (10.0, 10.0, 10.0), radius=0.2)
+    scene = Scene((ground, chest), (build.grey,), (lamp,))
+    under, above = [], 0.0
+    for settings in (Settings(triangles=1500, error=0.05, threads=2), Settings(triangles=40_000, threads=2)):
+        chest_baked, ground_baked = bake(scene, settings).objects
+        centre, area = centres_and_areas(chest_baked)
+        bottom = centre[:, 2] < 0.101
+        under.append(area[bottom] @ chest_baked.layers["combined"][bottom].mean(axis=(1, 2)) / area[bottom].sum())
+        _, area = centres_and_areas(ground_baked)
+        above = area @ ground_baked.layers["combined"].mean(axis=(1, 2)) / area.sum()
+    assert under[0] == pytest.approx(under[1], abs=0.04 * above)
