@@ -99,10 +99,10 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
         start = [*values]
     sharpest, best = tried[0], tried[-1]
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
-    unseen = _unresolved(bend, sharpest.predicted - sharpest.spread / 2.0, own_noise, area * shown)
+    distance = sharpest.predicted - sharpest.spread / 2.0
+    unseen = _unresolved(bend, distance, own_noise, area * shown)
     # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
-    left = sharpest.predicted - sharpest.spread / 2.0 - own_noise
-    unseen[fit.broken] = np.maximum(left[fit.broken], unseen[fit.broken])
+    unseen[fit.broken] = np.maximum((distance - own_noise)[fit.broken], unseen[fit.broken])
     together = fit.solve_within(fit.system(merged), best.alpha, limits)
     return Fitted(
         best.alpha, together, together @ halves[0].to_grey, best.spread / 4.0, unseen + best.smoothed_by(sharpest)

@@ -8,7 +8,7 @@ matters or there are as many as allowed.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight
-from .gather import Points, gather_direct, gather_indirect
+from .gather import Points, gather_direct
 from .parallel import Workers
 from .patches import Cells
 from .receivers import Receivers, split_cells
@@ -72,9 +72,7 @@ class Adaptation:
 
     def __init__(self, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers) -> None:
         self._light = direct_light
-        self._around = around and replace(
-            around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "contact patterns"))
-        )
+        self._around = around and around.with_rays(_RAYS, stream(seed, "contact patterns"))
         self._seed = seed
         self._workers = workers
         self._mean = 0.0
@@ -121,7 +119,7 @@ class Adaptation:
             streams = _FIRST_STREAM + 100 * number + k
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
             self.rays += light.rays
-            direct = light.irradiance.mean(axis=1)
+            direct = light.grey
             hidden = np.zeros(len(chosen), dtype=bool)
             if self._around is not None:
                 if number == 0:
@@ -144,17 +142,15 @@ class Adaptation:
     def _look(self, around: Surroundings, number: int, points: Points) -> tuple[Float64, Bool]:
         """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; and
         whether nearly only backs surround them."""
-        arriving, _, enclosed, rays = gather_indirect(
-            points, around.hemispheres, around.tables[0], self._seed, number, self._workers
-        )
+        arriving, enclosed, rays = around.look(points, self._seed, number, self._workers)
         self.rays += rays
-        return arriving[:, :-1] @ around.to_grey, enclosed
+        return arriving, enclosed
 
     def _seen(self, around: Surroundings, number: int, points: Points) -> Float64:
         """Mean irradiance (n,) of what is seen from the points."""
-        seen, _, _, rays = gather_indirect(points, around.hemispheres, around.lit, self._seed, number, self._workers)
+        seen, rays = around.light_in_sight(points, self._seed, number, self._workers)
         self.rays += rays
-        return seen[:, 0]
+        return seen
 
 
 def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:

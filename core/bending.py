@@ -8,7 +8,6 @@ left is within the asked error. Where light is flat the coarse triangles stay.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 
@@ -47,9 +46,7 @@ class Bends:
     ) -> None:
         self.rays: Counter[str] = Counter()
         self._light = direct_light
-        self._around = around and replace(
-            around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "bend patterns"))
-        )
+        self._around = around and around.with_rays(_RAYS, stream(seed, "bend patterns"))
         self._effort = effort
         self._contours = contours
         self._seed = seed

@@ -19,12 +19,12 @@ import numpy as np
 
 from .convexity import nothing_stands_between
 from .direct.illumination import DirectLight
-from .gather import Points, gather_direct, gather_indirect
+from .gather import Points, gather_direct
 from .parallel import Workers
 from .receivers import Receivers, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
 from .scene import Bool, Float64, Scene
-from .survey import Surroundings
+from .survey import GAP, Surroundings
 from .tessellation import Int64
 from .visibility import offset_along
 
@@ -46,8 +46,6 @@ _SIGNIFICANT = 4.0
 _PARTED = 0.5
 #: How far beside a side of a cell, relative to its height, it shows what is on either side.
 _BESIDE_SIDE = 0.1
-#: Something that lies within this share of an edge's length above it covers it.
-_GAP = 0.25
 #: Rays that tell how much light there is, and whether a point is inside a solid.
 _SHADOW_RAYS, _RAYS = 8, 16
 #: The ends of a way along a surface are left out, lest it meets what bounds the surface.
@@ -122,9 +120,7 @@ class Contours:
         # A sheet may lie close above another, and still nothing stand between either and a lamp.
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
         self._nothing_to_find = alone or (not self._lights and around is None)
-        self._around = around and replace(
-            around, hemispheres=around.hemispheres.with_rays(_RAYS, stream(seed, "contour patterns"))
-        )
+        self._around = around and around.with_rays(_RAYS, stream(seed, "contour patterns"))
         self._seed = seed
         self._workers = workers
 
@@ -157,7 +153,7 @@ class Contours:
         """Cells (c,) with others around them that have other lights in sight, or that are covered."""
         cells, corner = receivers.cells, receivers.cell_vertex
         points = Points(cells, np.arange(len(cells)), np.full((len(cells), 3), 1 / 3))
-        sight = self._sight(points, _GAP * points.size)
+        sight = self._sight(points, GAP * points.size)
         low, high = np.full((2, int(corner.max()) + 1), sight[0])
         for k in range(3):
             low[corner[:, k]] = high[corner[:, k]] = sight
@@ -210,7 +206,7 @@ class Contours:
     def _on_edges(self, receivers: Receivers, edges: _Edges, place: Float64) -> Int64:
         start = Points(receivers.cells, edges.cell, edges.weights(np.full(len(place), _PLACES[0])))
         points = Points(receivers.cells, edges.cell, edges.weights(place))
-        return self._sight(points, _GAP * edges.length) + _BARRED * self._barred(start, points.positions)
+        return self._sight(points, GAP * edges.length) + _BARRED * self._barred(start, points.positions)
 
     def _barred(self, points: Points, targets: Float64) -> Bool:
         """Whether something stands on the surface between points and targets (n, 3) on it."""
@@ -251,11 +247,11 @@ class Contours:
             points = Points(receivers.cells, edges.cell, edges.weights(where))
             found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM + k, self._workers)
             self.rays += found.rays
-            light.append(found.irradiance.mean(axis=1))
+            light.append(found.grey)
             noise.append(np.sqrt(found.variance).mean(axis=1))
             if 0 < k < 3:
                 beside.append(points)
-                looks.append(self._look(points, _GAP * edges.length, k))
+                looks.append(self._look(points, GAP * edges.length, k))
         step = np.abs(light[2] - light[1])
         sharp = (step > _SHARP * np.abs(light[3] - light[0])) & (step > _CONTRAST * np.maximum(light[1], light[2]))
         sharp &= step > _SIGNIFICANT * np.hypot(noise[1], noise[2])
@@ -270,15 +266,12 @@ class Contours:
         if around is None:
             none = np.zeros(len(reach), dtype=bool)
             return _Look(np.zeros(len(reach)), none, ~none)
-        table = around.tables[0][:, : len(around.to_grey)]
-        arriving, _, enclosed, rays = gather_indirect(
-            points, around.hemispheres, table, self._seed, _STREAM + number, self._workers
-        )
+        arriving, enclosed, rays = around.look(points, self._seed, _STREAM + number, self._workers)
         near, far = (
             around.hemispheres.covered(points.positions, points.normals, times * reach) for times in (1.0, 2.0)
         )
         self.rays += rays + Counter(contact=2 * len(reach))
-        return _Look(arriving @ around.to_grey, enclosed | near, ~enclosed & ~far)
+        return _Look(arriving, enclosed | near, ~enclosed & ~far)
 
     def _breaks(self, receivers: Receivers, near: Bool) -> Bool:
         """Sides (c, 3) of near (c,) cells with a light that is in sight as a whole on one side and hidden on the other,
@@ -294,7 +287,7 @@ class Contours:
             points = Points(receivers.cells, side // 3, weights)
             beside.append(points)
             sight.append(self._sight(points, None))
-            looks.append(self._look(points, _GAP * points.size, 4 + k))
+            looks.append(self._look(points, GAP * points.size, 4 + k))
         one, other = sight
         parted = self._barred(beside[0], beside[1].positions)
         jumps = (one >> _WHOLE & ~other | other >> _WHOLE & ~one) & ((1 << _WHOLE) - 1)

@@ -120,7 +120,7 @@ def _gather(
         halves = halves.reshape(len(code), 2, -1).astype(np.float64) / rays
         irradiance = (halves[:, 0] + halves[:, 1]) / 2.0
         deviation = (halves[:, 0] - halves[:, 1]) / 2.0
-        behind = ((code >= codes.patches) & (code < codes.lost)).mean(axis=1)
+        behind = codes.of_backs(code).mean(axis=1)
         rays_cast = Counter({"gather": code.size, "onward": looks.onward, "cut off": looks.cut})
         return irradiance, deviation, behind > _ENCLOSED, rays_cast
 

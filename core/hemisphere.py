@@ -40,6 +40,10 @@ class Codes:
         """The first of the codes of rays that left the scene, one for each texel of the sky."""
         return 2 * self.patches + 1
 
+    def of_backs(self, code: Int32) -> Bool:
+        """Which of some codes (...) are of the backs of patches."""
+        return np.asarray((code >= self.patches) & (code < self.lost))
+
 
 class Looks(NamedTuple):
     """What rays from n points met: code (n, rays) int32; tint (n, rays, 3) of what they bring, None where it is one;

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .patches import Patches, Space
+from .patches import Patches, Space, row_numbers
 from .pilot import Escapes, Pilot
 from .sampling import stream
 from .scene import Float64, Portal, Vector
@@ -95,11 +95,12 @@ def _planes(patches: Patches) -> list[_Plane]:
     normals = normals * np.sign(normals[np.arange(len(normals)), leading])[:, None]
     offset = np.einsum("tk,tk->t", corners.mean(axis=1), normals)
     key = np.rint(np.column_stack([normals, offset]) / _FLAT).astype(np.int64)
-    group, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)[:3]
+    number = row_numbers(key)
+    group, first, count = np.unique(number, return_index=True, return_counts=True)
     largest = np.argsort(-count, kind="stable")[:_PLANES]
     found = []
     for index in largest:
-        own = (key == group[index]).all(axis=1)
+        own = number == group[index]
         found.append(_along_edges(normals[first[index]], float(offset[own].mean()), corners[own]))
     low, high = patches.corners.min(axis=(0, 1)), patches.corners.max(axis=(0, 1))
     axes = np.eye(3)

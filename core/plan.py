@@ -24,7 +24,7 @@ from .effects import (
 from .openings import find_openings
 from .pilot import Pilot, look_for_sky
 from .result import Effect
-from .scene import Scene, SkyMap
+from .scene import Scene
 from .settings import Settings, asked_error
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
@@ -241,7 +241,7 @@ class _Prices:
         pieces = self._pieces
         if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
             pieces = _TREE_COST
-        suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") and isinstance(scene.sky, SkyMap) else 0
+        suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
         windows = len(scene.portals) if planned.active("portals") else 0
         asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces + suns + windows, 1))
         per_light = asked * effort.shadow_rays * (cells * (passes + 1) + 8 * patches)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,6 +56,22 @@ class Surroundings:
     emitted: slice
     to_grey: Float64
     lit: Float32
+
+    def with_rays(self, rays: int, rng: np.random.Generator) -> Surroundings:
+        """The same, looked at with another number of rays."""
+        return replace(self, hemispheres=self.hemispheres.with_rays(rays, rng))
+
+    def look(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Bool, Counter[str]]:
+        """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; whether
+        nearly only backs surround them; and the rays it took."""
+        table = self.tables[0][:, : len(self.to_grey)]
+        arriving, _, enclosed, rays = gather_indirect(points, self.hemispheres, table, seed, number, workers)
+        return arriving @ self.to_grey, enclosed, rays
+
+    def light_in_sight(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Counter[str]]:
+        """Mean irradiance (n,) of what is seen from the points, and the rays it took."""
+        seen, _, _, rays = gather_indirect(points, self.hemispheres, self.lit, seed, number, workers)
+        return seen[:, 0], rays
 
 
 def look_up(
@@ -230,11 +246,9 @@ class Survey:
         self._mean = float(total.mean())
 
         def look(some: Points) -> Float64:
-            seen, _, _, cast = gather_indirect(
-                some, around.hemispheres, around.lit, self.seed, 4_000_000 + number, self.workers
-            )
+            seen, cast = around.light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
             self.rays += cast
-            return seen[:, 0]
+            return seen
 
         valid = ~out_of_sight(points, around, enclosed, total, direct, self._mean, look)
         noise = (deviation[:, :columns] @ around.to_grey) ** 2
@@ -268,13 +282,10 @@ class Survey:
                 break
             points = Points(self.receivers.cells, chosen, np.broadcast_to(weights, (len(chosen), 3)))
             light = self._direct(points, 3_000_000 + k)
-            table = around.tables[0][:, : len(around.to_grey)]
-            arriving, _, enclosed, rays = gather_indirect(
-                points, around.hemispheres, table, self.seed, 3_000_000 + k, self.workers
-            )
+            arriving, enclosed, rays = around.look(points, self.seed, 3_000_000 + k, self.workers)
             self.rays += rays
             direct = light.grey
-            chosen = chosen[enclosed & dark(arriving @ around.to_grey + direct, direct, self._mean)]
+            chosen = chosen[enclosed & dark(arriving + direct, direct, self._mean)]
         element = self.receivers.cells.element
         seen = np.ones(len(element), dtype=bool)
         seen[chosen] = False

@@ -14,7 +14,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..patches import Space
-from ..scene import Float32, Float64, Scene, SkyMap, SunLamp
+from ..scene import RGB, Float32, Float64, Scene, SkyMap, SunLamp
 from ..sky import Rectangle, Sky
 from .lamps import BEYOND, Light, Panel, Ways, place
 
@@ -26,7 +26,7 @@ _MOST_DISCS, _DEGREES = 12, 8.0
 
 def divide_sky(scene: Scene, space: Space, *, suns: bool, portals: bool) -> tuple[Sky, list[Light]]:
     """The sky that rays find, and the lights for the rest of it: its bright parts, and what portals let in."""
-    smooth, bright = split_bright(scene.sky) if suns and isinstance(scene.sky, SkyMap) else (scene.sky, ())
+    smooth, bright = split_bright(scene.sky) if suns else (scene.sky, ())
     sky = Sky.of(smooth)
     shining = scene.portals if portals and sky.light.any() else ()
     rectangles = [Rectangle.of(portal, space) for portal in shining]
@@ -68,8 +68,10 @@ class Window(Panel):
 
 
 @lru_cache(maxsize=2)
-def split_bright(sky: SkyMap) -> tuple[SkyMap, tuple[SunLamp, ...]]:
-    """The map without what is much brighter than the rest, and that as suns; none where the sky is even enough."""
+def split_bright(sky: RGB | SkyMap) -> tuple[RGB | SkyMap, tuple[SunLamp, ...]]:
+    """The sky without what is much brighter than the rest, and that as suns; none where the sky is even enough."""
+    if not isinstance(sky, SkyMap):
+        return sky, ()
     height, width = sky.pixels.shape[:2]
     band = np.diff(-np.cos(np.linspace(0.0, np.pi, height + 1))) * 2.0 * np.pi / width
     grey = sky.pixels.mean(axis=2, dtype=np.float64)

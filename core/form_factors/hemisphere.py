@@ -206,7 +206,7 @@ def _look_around(
         origins, axes = points[part].reshape(-1, 3), normals[part].reshape(-1, 3)
         looks = hemispheres.cast(origins, axes, axes, rng)
         met = looks.code.reshape(-1, SITES, hemispheres.rays)
-        hidden = _hidden(((met >= codes.patches) & (met < codes.lost)).mean(axis=2))
+        hidden = _hidden(codes.of_backs(met).mean(axis=2))
         if patches.transmission is not None:
             # Both sides of what transmits are coupled patch by patch, so both are open.
             hidden &= ~(patches.transmission[side[part] % len(patches)] > 0.0).any(axis=1)[:, None]
