@@ -51,6 +51,9 @@ def test_no_chunk_begins_after_a_stop(threads):
         if number == 3:
             progress.cancel()
             stopped.set()
+        elif number > 3:
+            # Or another thread might be through with all of them while this one has not come to stop.
+            stopped.wait(timeout=5)
 
     with Workers(threads, progress) as workers, pytest.raises(Cancelled):
         list(workers.map(work, 1000, 1))
