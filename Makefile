@@ -77,7 +77,7 @@ colours: .venv/ready
 	.venv/bin/python -m radiosity_baker.docs.colours
 
 fuzz: .venv/ready
-	.venv/bin/python -m pytest --quiet tests/hard_cases --hypothesis-profile=fuzz
+	.venv/bin/python -m pytest --quiet tests/hard_cases --hypothesis-profile=fuzz --junitxml=build/fuzz.xml -o junit_family=xunit1
 
 reliability: .venv/ready
 	.venv/bin/python docs/reliability.py

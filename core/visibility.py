@@ -7,10 +7,12 @@ OCCLUDED answers 0 for blocked and -1 for free; `dists` is overwritten in place;
 
 from __future__ import annotations
 
+from functools import cache
 from typing import NamedTuple, cast
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore import EmbreeDevice
 from embreex.rtcore_scene import EmbreeScene
 
 from .optics import ABSORBED, GLINT, MIRROR, Optics
@@ -158,7 +160,7 @@ class _Triangles:
     """Triangles (t, 3, 3) in a scene of Embree's, which is made ready for any thread."""
 
     def __init__(self, corners: Float64) -> None:
-        self._scene = EmbreeScene(robust=True)
+        self._scene = EmbreeScene(_device(), robust=True)
         vertices = np.ascontiguousarray(corners.reshape(-1, 3), dtype=np.float32)
         indices = np.arange(len(vertices), dtype=np.int32).reshape(-1, 3)
         self._mesh = TriangleMesh(self._scene, vertices, indices)
@@ -173,6 +175,12 @@ class _Triangles:
 
     def unblocked(self, origins: Float32, ways: Float32) -> Bool:
         return cast(Bool, self._scene.run(origins, ways, _reach(len(origins)), query="OCCLUDED") == -1)
+
+
+@cache
+def _device() -> EmbreeDevice:
+    """One for all scenes: a thousand of their own, as many as a process can have, end it without a word."""
+    return EmbreeDevice()
 
 
 def _reach(rays: int) -> Float32:

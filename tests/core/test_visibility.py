@@ -82,3 +82,12 @@ def test_two_scenes_do_not_share_triangles(build, layers):
     other = Visibility(corners_of(build.quad(corner=(5, 5, 5))))
     assert other.nearest(single([0.7, 0.2, 2]), single([0, 0, -1])).tolist() == [-1]
     assert layers.nearest(single([0.7, 0.2, 2]), single([0, 0, -1])).tolist() == [4]
+
+
+def test_any_number_of_scenes_at_a_time(build):
+    """Seen to fail: a device for each of them, of which a process can have 1,024: a crash. Found by 1,000 faults in a
+    row, each of which held on to its bake."""
+    square = corners_of(build.quad())
+    scenes = [Visibility(square) for _ in range(1500)]
+    down = single([0, 0, -1])
+    assert all(scene.nearest(single([0.7, 0.2, 2]), down) >= 0 for scene in scenes)

@@ -48,7 +48,7 @@ class Fuse(Progress):
             self.looks += 1
             looks = self.looks
         if looks >= self.moment:
-            raise self.fault
+            raise type(self.fault)(*self.fault.args)  # one that is raised again holds on to all it has gone through
         super().check()
 
 
