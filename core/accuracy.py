@@ -3,7 +3,8 @@
 Three causes, independent enough to add as squares:
 - sampling: how much the fits of two independent halves of all samples differ;
 - transport: how much the gathered light changes when the patches it comes from are twice as large, and what follows
-  from that for the patches there are (Richardson's extrapolation);
+  from that for the patches there are (Richardson's extrapolation); and how well the loss is known that its level is a
+  matter of;
 - resolution: what the triangles cannot show, however long one computes: by how much the shown light bends from triangle
   to triangle, by what is left of the samples' distance from it once their own noise is taken away, and by what
   smoothing has taken.
@@ -152,18 +153,25 @@ def squared_mean(corners: Float64) -> Float64:
     return np.asarray((corners.sum(axis=1) ** 2 + (corners**2).sum(axis=1)) / 12.0)
 
 
+def level_error(doubts: tuple[tuple[float, float], ...]) -> float:
+    """Relative error of all reflected light together, from what the halves say of it: by their rays, and with coarser
+    patches."""
+    by_rays, by_coarser = np.array(doubts).T
+    return float(np.sqrt(np.mean(by_rays**2 + (by_coarser / COARSENING) ** 2)))
+
+
 def estimate_error(
-    parts: list[Fitted], coarser: Float64, area: Float64, shown: Float64, scale: float
+    parts: list[Fitted], transport: Float64, area: Float64, shown: Float64, scale: float
 ) -> tuple[ErrorEstimate, Float64]:
     """The three errors relative to the mean radiance, and the squared error (c,) of each cell's radiance.
 
-    parts: the fits whose sum is the light; coarser (c,): squared change of the mean irradiance with coarser patches.
+    parts: the fits whose sum is the light; transport (c,): squared error of the mean irradiance by transport.
     shown (c,): mean square over the channels of albedo / pi, from mean irradiance to radiance; scale: mean radiance,
     W/(m^2 sr).
     """
     if scale <= 0:
         return ErrorEstimate(0.0, 0.0, 0.0), np.zeros_like(area)
-    squares = [sum(p.sampling for p in parts), coarser / COARSENING**2, sum(p.resolution for p in parts)]
+    squares = [sum(p.sampling for p in parts), transport, sum(p.resolution for p in parts)]
     weight = area * shown / area.sum()
     causes = [np.sqrt(max(float(weight @ square), 0.0)) / scale for square in squares]
     local = sum(np.maximum(square, 0.0) for square in squares) * shown

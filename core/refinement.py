@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .accuracy import UNKNOWN, ErrorEstimate, Fitted, estimate_error, fit_halves
+from .accuracy import COARSENING, UNKNOWN, ErrorEstimate, Fitted, estimate_error, fit_halves, level_error
 from .clock import Clock
 from .parallel import Workers
 from .plan import Effort
@@ -121,10 +121,21 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
 def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
     found = fit_samples(survey, scene, workers)
-    coarser = survey.coarser[0] * survey.coarser[1]
-    error, cell_error = estimate_error(found.fits, coarser, found.area, found.shown, found.radiance)
+    transport = _squared_transport_error(survey, found.fits)
+    error, cell_error = estimate_error(found.fits, transport, found.area, found.shown, found.radiance)
     values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
     return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=survey.buried())
+
+
+def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
+    """(c,) of the mean irradiance: by patches that are too large, and by a wrong level of all reflected light."""
+    around, receivers = survey.surroundings, survey.receivers
+    by_patches = survey.coarser[0] * survey.coarser[1] / COARSENING**2
+    if around is None:
+        return by_patches
+    reflected = fits[1].values[:, around.reflected].mean(axis=1)
+    on_cells = reflected[receivers.corner_vertex[receivers.cells.element]].mean(axis=1)
+    return by_patches + (level_error(around.level_doubts) * on_cells) ** 2
 
 
 @dataclass(frozen=True, eq=False)

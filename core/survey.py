@@ -46,7 +46,8 @@ class Surroundings:
     one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
-    lit (codes, 1): mean irradiance of what a ray meets, however dark its colour is.
+    lit (codes, 1): mean irradiance of what a ray meets, however dark its colour is. level_doubts: by what share of
+    itself each half may misjudge all reflected light, by its rays and by larger patches.
     """
 
     hemispheres: Hemispheres
@@ -56,6 +57,7 @@ class Surroundings:
     emitted: slice
     to_grey: Float64
     lit: Float32
+    level_doubts: tuple[tuple[float, float], ...]
 
     def with_rays(self, rays: int, rng: np.random.Generator) -> Surroundings:
         """The same, looked at with another number of rays."""
@@ -98,6 +100,7 @@ def look_up(
             [np.full(channels, 1 / channels), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / channels)]
         ),
         lit=_lit(halves[0], sky),
+        level_doubts=tuple(half.level_doubts() for half in halves),
     )
 
 

@@ -11,7 +11,7 @@ from .direct.illumination import DirectLight
 from .form_factors.analytic import analytic_rows
 from .form_factors.centroid import centroid_rows
 from .form_factors.hemisphere import Opening, Sides, hemisphere_rows
-from .form_factors.rows import Rows, balance, symmetric_exchange
+from .form_factors.rows import Rows, balance, one_sided, symmetric_exchange
 from .parallel import Workers
 from .patches import Patches, coarser_groups
 from .plan import Effort, Plan
@@ -30,13 +30,15 @@ _CHUNK = 1024
 class Exchange:
     """Light between sides: exchange areas G_ij or plain rows F_ij, one matrix for each channel if anything on the way
     is coloured; what escapes; the shares (s, 1) or (s, 3) that are lost to mirrors and glass; irradiance (s, 3) from
-    emitting surfaces off mirrors, or None; and the rays cast, by purpose."""
+    emitting surfaces off mirrors, or None; the area (s,) by which the rays saw each side more than they saw from it;
+    and the rays cast, by purpose."""
 
     sides: Sides
     rows: tuple[Rows, ...]
     opening: Opening
     lost: Float64
     glints: Float64 | None
+    one_sided: Float64
     rays: Counter[str]
     reciprocal: bool
 
@@ -88,6 +90,24 @@ class Transport:
         area = np.bincount(group, self.sides.area)
         means = [np.bincount(group, self.sides.area * v) / np.maximum(area, 1e-300) for v in values.T]
         return np.stack(means, axis=1)[group]
+
+    def level_doubts(self) -> tuple[float, float]:
+        """By what share of itself all reflected light may be too bright or too dark: by what rays saw from one side
+        alone, and by how much more is absorbed when the patches that light comes from are larger.
+
+        What is emitted is absorbed in the end, so where little is absorbed at each bounce the level of the light hangs
+        on a small loss. To first order a loss that is misjudged by a share of what is emitted changes it by that share.
+        """
+        emitted = float(self.sides.area @ self.incoming.mean(axis=1))
+        if emitted <= 0.0 or not self.sides.albedo.any():
+            return 0.0, 0.0
+        sent = self.reflected
+        grey = sent.mean(axis=1)
+        if len(self.exchange.rows) == 1:
+            sent = grey[:, None]
+        gained = _received(self.exchange, self.over_coarser_patches(sent) - sent)
+        absorbed = gained.mean(axis=1) - reflected(self.sides, gained).mean(axis=1)
+        return float(self.exchange.one_sided @ grey) / emitted, float(self.sides.area @ absorbed) / emitted
 
     def energy(self, channels: Float64 | float = 1.0 / 3.0) -> dict[str, float]:
         """Where the light went, in W: what reached the surfaces first, what they absorbed, what left by the openings,
@@ -180,7 +200,7 @@ def fill_with_light(
     )
 
 
-def _received(exchange: Exchange, radiosity: Float64, workers: Workers) -> Float64:
+def _received(exchange: Exchange, radiosity: Float64, workers: Workers | None = None) -> Float64:
     """Irradiance (s, 3) from the radiosity (s, 3) of all sides."""
     area = exchange.sides.area
     factors = [rows.scaled(1.0 / area) if exchange.reciprocal else rows for rows in exchange.rows]
@@ -232,15 +252,16 @@ def estimate_exchange(
             balance(symmetric_exchange(matrix, area, samples), area * share, workers)
             for matrix, share in zip(found.rows, kept.T, strict=True)
         )
-        return Exchange(found.sides, rows, found.opening, lost, found.glints, found.rays, reciprocal=True)
+        alone = sum((one_sided(matrix, area) for matrix in found.rows), np.zeros(len(area))) / len(rows)
+        return Exchange(found.sides, rows, found.opening, lost, found.glints, alone, found.rays, reciprocal=True)
     estimator = analytic_rows if effort.estimator == "analytic" else centroid_rows
     estimate = estimator(patches, visibility, workers, threshold=effort.threshold, seed=seed, purpose=purpose, sky=sky)
     area, opening, rays = estimate.sides.area, estimate.opening, Counter(transport=estimate.rays)
-    nothing = np.zeros((len(area), 1))
+    nothing, alone = np.zeros((len(area), 1)), one_sided(estimate.rows, area)
     if effort.estimator == "centroid":
-        return Exchange(estimate.sides, (estimate.rows,), opening, nothing, None, rays, reciprocal=False)
+        return Exchange(estimate.sides, (estimate.rows,), opening, nothing, None, alone, rays, reciprocal=False)
     matrix = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - opening.share), workers)
-    return Exchange(estimate.sides, (matrix,), opening, nothing, None, rays, reciprocal=True)
+    return Exchange(estimate.sides, (matrix,), opening, nothing, None, alone, rays, reciprocal=True)
 
 
 def light_on_sides(

@@ -106,6 +106,14 @@ def symmetric_exchange(rows: Rows, areas: ArrayLike, samples: ArrayLike = 1.0) -
     )
 
 
+def one_sided(rows: Rows, areas: ArrayLike) -> Float64:
+    """(n,) exchange area by which each side is seen more than it sees: zero by reciprocity, but for noise and for what
+    is seen from one side alone. rows: square, F_ij, each with rays of its own. areas (n,)."""
+    owner = rows.owners()
+    directed = np.asarray(areas, dtype=np.float64)[owner] * rows.weights
+    return _sums(rows.columns, directed, len(rows)) - _sums(owner, directed, len(rows))
+
+
 def balance(
     exchange: Rows, targets: ArrayLike, workers: Workers | None = None, *, tolerance: float = 1e-6, steps: int = 12
 ) -> Rows:
@@ -148,7 +156,7 @@ def _pointers(lengths: ArrayLike) -> Int64:
     return np.append(np.int64(0), np.cumsum(lengths, dtype=np.int64))
 
 
-def _sums(owners: Int64, weights: NDArray[np.floating[Any]], count: int) -> Float64:
+def _sums(owners: Int64 | Int32, weights: NDArray[np.floating[Any]], count: int) -> Float64:
     return np.bincount(owners, weights=weights, minlength=count).astype(np.float64)
 
 
