@@ -443,6 +443,10 @@ SENTENCES |= {
 
 #: What a bake itself has to say.
 SENTENCES |= {
+    "No light is found: the world shines, but no ray from the baked objects has left the scene. If there is an "
+    "opening, place an area lamp in it, facing inward, and switch on its Portal.": "Kein Licht gefunden: die Welt "
+    "leuchtet, aber kein Strahl von den gebackenen Objekten hat die Szene verlassen. Gibt es eine Öffnung, eine "
+    "Flächenlampe hineinsetzen, nach innen gerichtet, und ihr Portal einschalten.",
     "The estimated error is larger than the light itself: a few places are far brighter than all others, as where a "
     "lamp touches a surface. The Error layer shows where; there only much smaller triangles help, or moving the lamp "
     "away.": "Der geschätzte Fehler ist größer als das Licht selbst: wenige Stellen sind weit heller als alle anderen, "

@@ -161,18 +161,20 @@ def level_error(doubts: tuple[tuple[float, float], ...]) -> float:
 
 
 def estimate_error(
-    parts: list[Fitted], transport: Float64, area: Float64, shown: Float64, scale: float
+    parts: list[Fitted], transport: Float64, area: Float64, shown: Float64, scale: float, missed: float = 0.0
 ) -> tuple[ErrorEstimate, Float64]:
     """The three errors relative to the mean radiance, and the squared error (c,) of each cell's radiance.
 
     parts: the fits whose sum is the light; transport (c,): squared error of the mean irradiance by transport.
     shown (c,): mean square over the channels of albedo / pi, from mean irradiance to radiance; scale: mean radiance,
-    W/(m^2 sr).
+    W/(m^2 sr); missed: irradiance that may be there though no ray has found it, W/m^2. It counts as transport, and to
+    the light that errors are relative to: where no other is, all is in doubt, which is an error of 1.
     """
+    weight = area * shown / (area.sum() or 1.0)
+    scale += missed * float(np.sqrt(weight.sum()))
     if scale <= 0:
         return ErrorEstimate(0.0, 0.0, 0.0), np.zeros_like(area)
-    squares = [sum(p.sampling for p in parts), transport, sum(p.resolution for p in parts)]
-    weight = area * shown / area.sum()
+    squares = [sum(p.sampling for p in parts), transport + missed**2, sum(p.resolution for p in parts)]
     causes = [np.sqrt(max(float(weight @ square), 0.0)) / scale for square in squares]
     local = sum(np.maximum(square, 0.0) for square in squares) * shown
     return ErrorEstimate(causes[0], causes[1], causes[2]), local

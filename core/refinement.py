@@ -122,7 +122,9 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
     found = fit_samples(survey, scene, workers)
     transport = _squared_transport_error(survey, found.fits)
-    error, cell_error = estimate_error(found.fits, transport, found.area, found.shown, found.radiance)
+    error, cell_error = estimate_error(
+        found.fits, transport, found.area, found.shown, found.radiance, survey.missed_sky
+    )
     values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
     return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=survey.buried())
 

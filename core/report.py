@@ -50,7 +50,7 @@ def make_report(
         peak_memory_mb=peak_memory_mb(),
         warnings=[
             *plan.scene.warnings,
-            *_warnings(settings, light, clock.elapsed, sum(len(o.triangles) for o in objects)),
+            *_warnings(settings, light, survey, clock.elapsed, sum(len(o.triangles) for o in objects)),
         ],
     )
 
@@ -62,10 +62,15 @@ def mean_energy(halves: tuple[Transport, ...], channels: Float64 | float = 1.0 /
     return {name: sum(ledger[name] for ledger in ledgers) / max(len(ledgers), 1) for name in names}
 
 
-def _warnings(settings: Settings, light: Light, seconds: float, triangles: int) -> list[str]:
+def _warnings(settings: Settings, light: Light, survey: Survey, seconds: float, triangles: int) -> list[str]:
     warnings = []
     total = light.error.total
-    if 1.0 < total < np.inf:
+    if survey.missed_sky > 0.0 and light.error.transport > 0.99:
+        warnings.append(
+            "No light is found: the world shines, but no ray from the baked objects has left the scene. If there is an "
+            "opening, place an area lamp in it, facing inward, and switch on its Portal."
+        )
+    elif 1.0 < total < np.inf:
         warnings.append(
             "The estimated error is larger than the light itself: a few places are far brighter than all others, as "
             "where a lamp touches a surface. The Error layer shows where; there only much smaller triangles help, or "

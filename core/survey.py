@@ -33,6 +33,9 @@ _DARK, _DIM, GAP = 0.05, 0.5, 0.25
 #: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
 _LIT = 0.25
 
+#: Of n rays of which none has met something, up to this over n may: at 95 % (rule of three: Hanley, Lippman-Hand 1983).
+_NONE_OF_N = 3.0
+
 #: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
 #: sides, for what shows of it beside a straight outline has a corner.
 _BESIDES = np.concatenate([0.997 * np.eye(3) + 1e-3, 0.4985 * (1.0 - np.eye(3)) + 1e-3])
@@ -198,6 +201,18 @@ class Survey:
         self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
         self._mean = 0.0
+
+    @property
+    def missed_sky(self) -> float:
+        """Irradiance W/m^2 that the sky may bring all the same where no ray has met it; 0 where one has, or it is
+        black."""
+        around = self.surroundings
+        if around is None or around.sky.start == around.sky.stop:
+            return 0.0
+        if any(half.high[:, around.sky].max(initial=0.0) > 0.0 for half in self.indirect):
+            return 0.0
+        brings = around.hemispheres.sky.light.mean(axis=0) @ around.to_grey[around.sky]
+        return float(brings) * min(_NONE_OF_N / max(self.rays["gather"], 1), 1.0)
 
     @property
     def tells_sky_apart(self) -> bool:
