@@ -42,7 +42,8 @@ class Path(NamedTuple):
 
 
 class Veiled(NamedTuple):
-    """What veils leave of the light along rays: tint (n, 3); how many rays it took, and how many were cut off."""
+    """What is left of the light along ways: tint (n, 3), 0 where they are blocked; how many rays it took besides the
+    first, and how many were cut off."""
 
     tint: Float32
     onward: int
@@ -66,7 +67,9 @@ class Visibility:
             self._blockers = _Triangles(corners[optics.blocks]) if optics.blocks.any() else None
             self.veiled = bool(optics.veils.any())
         if optics is not None and self.veiled:
-            self._veils, self._veil = _Triangles(corners[optics.veils]), np.flatnonzero(optics.veils)
+            between = optics.blocks | optics.veils
+            self._between = self._scene if between.all() else _Triangles(corners[between])
+            self._triangle_between = np.flatnonzero(between)
 
     def nearest(self, origins: Float32, directions: Float32) -> Int32:
         """Index of the first triangle that each ray (n, 3) meets, -1 where it leaves the scene."""
@@ -130,7 +133,10 @@ class Visibility:
         return self._blockers.unblocked(origins, ways)
 
     def veiled_along(self, origins: Float32, ways: Float32) -> Veiled:
-        """What veils leave of the light along ways (n, 3) that are unblocked; only in a scene that is `veiled`."""
+        """What blockers and veils leave of the light along ways (n, 3); only in a scene that is `veiled`.
+
+        One ray finds whichever comes first: only where that is a veil, the way goes on behind it.
+        """
         optics = cast(Optics, self.optics)
         tint = np.ones(ways.shape, dtype=np.float32)
         onward = np.arange(len(ways))
@@ -138,11 +144,15 @@ class Visibility:
         rays = 0
         for _ in range(MOST_TURNS):
             rays += len(onward)
-            met = self._veils.nearest_within(start, left)
-            some = met >= 0
-            if not some.any():
-                return Veiled(tint, rays, 0)
-            onward, triangle = onward[some], self._veil[met[some]]
+            met = self._between.nearest_within(start, left)
+            some = np.flatnonzero(met >= 0)
+            triangle = self._triangle_between[met[some]]
+            veil = optics.veils[triangle]
+            tint[onward[some[~veil]]] = 0.0
+            some, triangle = some[veil], triangle[veil]
+            if not len(some):
+                return Veiled(tint, rays - len(ways), 0)
+            onward = onward[some]
             from_here, way = start[some].astype(np.float64), left[some].astype(np.float64)
             points = optics.meet(triangle, from_here, way)
             tint[onward] *= optics.passing(triangle, points, way)
@@ -153,7 +163,7 @@ class Visibility:
             lit = (tint[onward].max(axis=1) > 0.0) & (np.einsum("nk,nk->n", left, way) > 0.0)
             onward, start, left = onward[lit], start[lit], left[lit]
         tint[onward] = 0.0
-        return Veiled(tint, rays, len(onward))
+        return Veiled(tint, rays - len(ways), len(onward))
 
 
 class _Triangles:

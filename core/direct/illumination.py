@@ -250,14 +250,12 @@ class DirectLight:
         # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
         ways = np.ascontiguousarray(ways.T, dtype=np.float32)
         origins = receivers.origins[point]
-        unblocked = self.visibility.unblocked_along(origins, ways)
         rays = Counter(shadow=len(sample))
         if not self.visibility.veiled:
-            return unblocked, None, rays
-        veiled = self.visibility.veiled_along(origins[unblocked], ways[unblocked])
-        tint = np.zeros((3, len(sample)), dtype=np.float32)
-        tint[:, unblocked] = veiled.tint.T
-        return unblocked, tint, rays + Counter({"onward": veiled.onward, "cut off": veiled.cut})
+            return self.visibility.unblocked_along(origins, ways), None, rays
+        veiled = self.visibility.veiled_along(origins, ways)
+        rays += Counter({"onward": veiled.onward, "cut off": veiled.cut})
+        return veiled.tint.max(axis=1) > 0, veiled.tint.T, rays
 
 
 class _Tally:

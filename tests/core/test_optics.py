@@ -94,7 +94,33 @@ def test_a_lamp_behind_films_is_tinted_by_their_product_exactly(build):
     np.testing.assert_allclose(lit.irradiance[0], np.array([0.25, 0.0625, 0]) * square**-1.5, rtol=1e-5)
     assert lit.signature[0] == -1, "seen in part, so that shadow edges of films are found"
     assert lit.rays["shadow"] == 1
-    assert lit.rays["onward"] == 3
+    assert lit.rays["onward"] == 2
+
+
+def test_only_ways_that_meet_a_veil_take_more_than_one_ray(build):
+    """Beside a veil, behind it, and behind it and a wall on either side of it."""
+    floor, veil = (
+        build.quad("floor", (-1, -1, 0), (6, 0, 0), (0, 2, 0)),
+        build.quad("veil", (-1, -1, 0.5), (1, 0, 0), (0, 2, 0), 1),
+    )
+    walls = [build.quad(f"wall {z}", (-1, 0, z), (1, 0, 0), (0, 1, 0)) for z in (0.3, 0.7)]
+    surfaces = build.grey, Surface("veil", HALF, opacity=0.5)
+    passed = {}
+    for name, objects in {
+        "alone": (floor, veil),
+        "below": (floor, veil, walls[0]),
+        "above": (floor, veil, walls[1]),
+    }.items():
+        patches = build.patches(Scene(objects, surfaces), 20)
+        visibility = Visibility(patches.corners, patches.optics)
+        points = np.array([[3.0, 0.4, 0.01], [-0.6, -0.4, 0.01], [-0.6, 0.4, 0.01]])
+        origins = patches.space.normalise(points).astype(np.float32)
+        ways = (patches.space.normalise(points + [0, 0, 2.0]) - origins).astype(np.float32)
+        passed[name] = visibility.veiled_along(origins, ways)
+    np.testing.assert_array_equal(passed["alone"].tint[:, 0], [1.0, 0.5, 0.5])
+    np.testing.assert_array_equal(passed["below"].tint[:, 0], [1.0, 0.5, 0.0])
+    np.testing.assert_array_equal(passed["above"].tint[:, 0], [1.0, 0.5, 0.0])
+    assert [passed[name].onward for name in ("alone", "below", "above")] == [2, 1, 2]
 
 
 def test_holes_are_where_the_texture_has_them(build):
