@@ -27,6 +27,10 @@ def chances(light: Float64, count: int) -> Float64:
 
 
 def draw(chance: Float64, start: Float64) -> Bool:
-    """Which lights (l, n) are asked: evenly spread over the sum of their chances, beginning at start (n,) in 0..1."""
-    steps = np.floor(np.cumsum(chance, axis=0) + start)
-    return np.asarray(np.diff(steps, axis=0, prepend=0.0) > 0)
+    """Which lights (h, l, n) are asked h times over, by their chances (l, n): evenly spread over the sum of these,
+    beginning at start (h, n) in 0..1."""
+    steps = np.floor(np.cumsum(chance, axis=0) + start[:, None])
+    drawn = np.empty(steps.shape, dtype=bool)
+    drawn[:, 0] = steps[:, 0] > 0
+    np.greater(steps[:, 1:], steps[:, :-1], out=drawn[:, 1:])
+    return drawn

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..sampling import GOLDEN, stream
 from ..scene import Bool, Float32, Float64
 from ..visibility import OFFSET, Visibility, offset_along
-from .choice import chances, draw
+from .crowd import Crowd
 from .emitter_tree import EmitterTree
 from .lamps import Light
 
@@ -78,6 +78,17 @@ class _Look:
     rays: Counter[str]
 
 
+@dataclass(frozen=True, eq=False)
+class _Answer:
+    """How much of a light receivers (n,) see: seen (h, n, 1), or (h, n, 3) in each channel, by each half of the ways;
+    which see it whole, and which in part; rays cast, by purpose."""
+
+    seen: Float64
+    whole: Bool
+    partly: Bool
+    rays: Counter[str]
+
+
 Source = Light | EmitterTree
 
 
@@ -87,6 +98,7 @@ class DirectLight:
     def __init__(self, sources: Sequence[Source], visibility: Visibility, seed: int) -> None:
         self.lights = lights = [source for source in sources if not isinstance(source, EmitterTree)]
         self._trees = [source for source in sources if isinstance(source, EmitterTree)]
+        self._crowd = Crowd(lights) if len(lights) > MOST_ASKED else None
         self.visibility = visibility
         # A random bit pattern for each light: the sum over the lights seen names their set.
         self._names = stream(seed, "light names").integers(1, 2**40, size=len(lights))
@@ -97,14 +109,16 @@ class DirectLight:
         """At points (n, 3) with geometric and shading normals (n, 3), `rays` shadow rays to each sized light."""
         along = np.stack([points.T, normals.T, shading.T]).astype(np.float32)
         tally = _Tally(_Receivers(along, offset_along(points, normals)))
-        if len(self.lights) <= MOST_ASKED:
+        if self._crowd is not None:
+            self._ask_some(self._crowd, tally, points, shading, rays, rng)
+        else:
             for light, name in zip(self.lights, self._names, strict=True):
                 share = light.share(points, shading)
                 brightest = tally.irradiance.max(axis=1, initial=0.0)
                 lit = np.flatnonzero(share * light.color.max() > _NEGLIGIBLE * brightest)
-                self._ask(tally, light, name, share[lit], lit, rays, rng)
-        else:
-            self._ask_some(tally, points, shading, rays, rng)
+                if len(lit):
+                    answer = self._ask(light, tally.receivers.only(lit), share[lit], rays, rng)
+                    tally.add(lit, answer, light.color, name)
         for tree in self._trees:
             self._shoot(tally, tree, rays, rng)
         return tally.illumination()
@@ -133,67 +147,54 @@ class DirectLight:
             rays += below.size
         return some, whole, rays
 
-    def _ask(
-        self,
-        tally: _Tally,
-        light: Light,
-        name: int,
-        share: Float64,
-        lit: NDArray[np.int64],
-        rays: int,
-        rng: np.random.Generator,
-    ) -> None:
-        """Add what a light of the share (m,) brings to the receivers lit (m,)."""
-        if not len(lit):
-            return
+    def _ask(self, light: Light, receivers: _Receivers, share: Float64, rays: int, rng: np.random.Generator) -> _Answer:
+        """What a light of the share (n,) brings to all receivers, or one light to each."""
         # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
         halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
-        look = self._look(light, tally.receivers.only(lit), _lattices(halves, per_half, len(lit), rng))
-        shape = (halves, per_half, len(lit))
+        look = self._look(light, receivers, _lattices(halves, per_half, len(share), rng))
+        shape = (halves, per_half, len(share))
         weights, arrived = look.weights.reshape(shape).mean(axis=1), look.arrived.reshape(-1, *shape).mean(axis=2)
         # (halves, n, 1), or one for each channel.
         seen = np.stack([_seen(share, weights, channel) for channel in arrived], axis=2)
-        tally.irradiance[lit] += seen.mean(axis=0) * light.color
-        if halves == 2:
-            tally.variance[lit] += ((seen[0] - seen[1]) * light.color) ** 2 / 4.0
         whole = look.clear.all(axis=0)
-        tally.signature[lit] += np.where(whole, name, 0)
-        tally.partly[lit] |= look.free.any(axis=0) & ~whole
-        tally.rays += look.rays
+        return _Answer(seen, whole, look.free.any(axis=0) & ~whole, look.rays)
 
-    def _ask_some(self, tally: _Tally, points: Float64, shading: Float64, rays: int, rng: np.random.Generator) -> None:
+    def _ask_some(
+        self, crowd: Crowd, tally: _Tally, points: Float64, shading: Float64, rays: int, rng: np.random.Generator
+    ) -> None:
         """Add what all lights bring: the brightest at a point one by one, the others by some of them.
 
         Each half of the rays draws lights of its own, one ray to each. As with a single light, what the drawn ones
         would bring with nothing in the way is corrected by what all would bring.
         """
-        shares = np.stack([light.share(points, shading) for light in self.lights])
-        color = np.stack([light.color for light in self.lights])
-        chance = chances(shares * color.mean(axis=1)[:, None], MOST_ASKED)
-        sure = chance == 1
-        others = np.where(sure, 0.0, chance)
-        drawn = np.stack([draw(others, rng.random(len(points))) for _ in range(2)])
-        arrived, expected = np.zeros((2, 2, len(points), 3))
-        free, clear, asked = np.zeros((3, len(points)), dtype=np.int64)
-        for number, (light, name) in enumerate(zip(self.lights, self._names, strict=True)):
-            lit = np.flatnonzero(sure[number])
-            self._ask(tally, light, name, shares[number, lit], lit, rays, rng)
-            half, lit = np.nonzero(drawn[:, number])
-            if not len(lit):
-                continue
-            look = self._look(light, tally.receivers.only(lit), _lattices(1, 1, len(lit), rng))
-            scale = color[number] / chance[number, lit][:, None]
+        sure, drawn, rest = crowd.choose(points, shading, MOST_ASKED, rng)
+        count = len(points)
+        for light, some in crowd.alike(sure):
+            answer = self._ask(light, tally.receivers.only(some.point), some.share, rays, rng)
+            brought = answer.seen * some.color
+            tally.irradiance += _summed(brought.mean(axis=0), some.point, count)
+            if len(brought) == 2:
+                tally.variance += _summed((brought[0] - brought[1]) ** 2 / 4.0, some.point, count)
+            # Which lights are sure changes from point to point; where shadows begin, those that are hidden do.
+            hidden = ~answer.whole & ~answer.partly
+            np.add.at(tally.signature, some.point[hidden], self._names[some.light[hidden]])
+            tally.partly[some.point[answer.partly]] = True
+            tally.rays += answer.rays
+        arrived, expected = np.zeros((2, 2 * count, 3))
+        free, clear, asked = np.zeros((3, count))
+        for light, some in crowd.alike(drawn):
+            look = self._look(light, tally.receivers.only(some.point), _lattices(1, 1, len(some.point), rng))
             # A way without size brings exactly the share, however its length was rounded.
-            whole = look.weights.mean(axis=0) if light.sized else shares[number, lit]
+            whole = look.weights.mean(axis=0) if light.sized else some.share
             part = look.arrived.mean(axis=1) if light.sized else whole * look.passed[:, 0]
-            expected[half, lit] += whole[:, None] * scale
-            arrived[half, lit] += part.T * scale
-            np.add.at(free, lit, look.free.sum(axis=0))
-            np.add.at(clear, lit, look.clear.sum(axis=0))
-            np.add.at(asked, lit, 1)
+            place = some.half * count + some.point
+            expected += _summed(whole[:, None] * some.color, place, 2 * count)
+            arrived += _summed(part.T * some.color, place, 2 * count)
+            free += np.bincount(some.point, look.free[0], count)
+            clear += np.bincount(some.point, look.clear[0], count)
+            asked += np.bincount(some.point, minlength=count)
             tally.rays += look.rays
-        every = np.einsum("ln,lk->nk", np.where(sure, 0.0, shares), color)
-        seen = _seen_in_all(every, expected, arrived)
+        seen = _seen_in_all(rest, expected.reshape(2, count, 3), arrived.reshape(2, count, 3))
         tally.irradiance += seen.mean(axis=0)
         tally.variance += (seen[0] - seen[1]) ** 2 / 4.0
         tally.partly |= (free > 0) & (clear < asked)
@@ -269,6 +270,15 @@ class _Tally:
         self.partly = np.zeros(count, dtype=bool)
         self.rays: Counter[str] = Counter()
 
+    def add(self, lit: NDArray[np.int64], answer: _Answer, color: Float64, name: int) -> None:
+        """Add what a light of this colour (3,) brings to the receivers lit (m,)."""
+        self.irradiance[lit] += answer.seen.mean(axis=0) * color
+        if len(answer.seen) == 2:
+            self.variance[lit] += ((answer.seen[0] - answer.seen[1]) * color) ** 2 / 4.0
+        self.signature[lit] += np.where(answer.whole, name, 0)
+        self.partly[lit] |= answer.partly
+        self.rays += answer.rays
+
     def illumination(self) -> Illumination:
         signature = np.where(self.partly, -1, self.signature)
         return Illumination(self.irradiance, self.variance, signature, self.rays)
@@ -298,6 +308,11 @@ def _seen_in_all(every: Float64, expected: Float64, arrived: Float64) -> Float64
     free = np.divide(arrived, expected, out=np.broadcast_to(free, arrived.shape).copy(), where=expected > 0)
     other = free[::-1]
     return np.asarray(other * every + (arrived - other * expected))
+
+
+def _summed(values: Float64, place: NDArray[np.int64], count: int) -> Float64:
+    """Sums (count, 3) of the values (k, 3) at each place (k,)."""
+    return np.stack([np.bincount(place, channel, count) for channel in values.T], axis=1)
 
 
 def _lattices(halves: int, count: int, points: int, rng: np.random.Generator) -> Float32:

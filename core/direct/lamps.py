@@ -12,7 +12,7 @@ components and samples first, (3, r, n), in single precision: numpy then runs al
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,23 +100,26 @@ class Ball:
     """A point lamp: a point, a sphere, or a disc that turns to the receiver.
 
     A sphere looks like its silhouette: a disc a little nearer and a little smaller, so one set of formulas serves both.
+    The same formulas serve many lamps at once, whose numbers are then arrays, see `crowd`.
     """
 
     round = True
+    #: What there is one of for each lamp.
+    each: tuple[str, ...] = ("position", "radius")
 
     def __init__(self, lamp: PointLamp | SpotLamp, space: Space) -> None:
         self.name = lamp.name
         self.position = space.normalise(np.array(lamp.position))
-        self.radius = lamp.radius / space.metres
+        self.radius: Any = lamp.radius / space.metres
         self.facing_disc = lamp.facing_disc
         self.color = np.array(lamp.intensity) / space.metres**2
         self.sized = self.radius > 0
         self.casts_shadow = lamp.casts_shadow
 
     def share(self, points: Float64, normals: Float64) -> Float64:
-        towards = self.position - points
-        distance = np.sqrt(np.einsum("nk,nk->n", towards, towards))
-        cosine = np.einsum("nk,nk->n", towards, normals) / np.maximum(distance, 1e-30)
+        x, y, z = self._towards(points)
+        distance = np.sqrt(x * x + y * y + z * z)
+        cosine = (x * normals[:, 0] + y * normals[:, 1] + z * normals[:, 2]) / np.maximum(distance, 1e-30)
         if not self.sized:
             return np.maximum(cosine, 0.0) / np.maximum(distance, 1e-9) ** 2
         radius, height = self._silhouette(distance)
@@ -124,7 +127,7 @@ class Ball:
         return cap_irradiance(cosine, sine) / self.radius**2
 
     def aim(self, points: Float32, unit: Float32) -> Ways:
-        towards = self.position.astype(np.float32)[:, None] - points
+        towards = np.atleast_2d(self.position).T.astype(np.float32) - points
         distance = np.sqrt((towards * towards).sum(axis=0))
         if not self.sized:
             return _spread(towards[:, None], distance[None], 1)
@@ -138,18 +141,23 @@ class Ball:
     def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
+    def _towards(self, points: Float64) -> tuple[Float64, ...]:
+        """Components (n,) of the ways from points (n, 3) to the middle of the lamp."""
+        return tuple(self.position[..., k] - points[:, k] for k in range(3))
+
     def _silhouette(self, distance: NDArray[Real]) -> tuple[NDArray[Real], NDArray[Real]]:
         """Radius (n,) and height (n,) over the receiver of the disc that the lamp looks like from a distance (n,)."""
+        own = np.asarray(self.radius, dtype=distance.dtype)
         if self.facing_disc:
-            return np.full_like(distance, self.radius), distance
-        inside = distance <= self.radius
-        shrink = np.sqrt(np.maximum(1.0 - (self.radius / np.maximum(distance, self.radius)) ** 2, 0.0))
-        shrink = shrink.astype(distance.dtype)
-        return np.where(inside, distance.dtype.type(self.radius), self.radius * shrink), distance * shrink**2
+            return np.broadcast_to(own, distance.shape), distance
+        shrink = np.sqrt(np.maximum(1 - (own / np.maximum(distance, own)) ** 2, 0))
+        return np.where(distance <= own, own, own * shrink), distance * shrink**2
 
 
 class Spot(Ball):
     """A ball behind a cone with a smooth edge."""
+
+    each = (*Ball.each, "inverse_axes", "cosine", "softness", "widening")
 
     def __init__(self, lamp: SpotLamp, space: Space) -> None:
         super().__init__(lamp, space)
@@ -162,19 +170,21 @@ class Spot(Ball):
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         """That of an even lamp, but nothing where no part of the lamp shines."""
-        towards = self.position - points
-        local = towards @ self.inverse_axes
-        length = np.maximum(np.sqrt(np.einsum("nk,nk->n", local, local)), 1e-30)
-        distance = np.maximum(np.sqrt(np.einsum("nk,nk->n", towards, towards)), 1e-30)
-        off_axis = np.arccos(np.clip(local[:, 2] / length, -1.0, 1.0))
+        x, y, z = self._towards(points)
+        across, up, along = (
+            x * self.inverse_axes[..., 0, k] + y * self.inverse_axes[..., 1, k] + z * self.inverse_axes[..., 2, k]
+            for k in range(3)
+        )
+        length = np.maximum(np.sqrt(across * across + up * up + along * along), 1e-30)
+        distance = np.maximum(np.sqrt(x * x + y * y + z * z), 1e-30)
+        off_axis = np.arccos(np.clip(along / length, -1.0, 1.0))
         reached = off_axis < np.arccos(self.cosine) + np.arctan(self.widening / distance)
-        share = np.zeros(len(points))
-        share[reached] = super().share(points[reached], normals[reached])
-        return share
+        return np.where(reached, super().share(points, normals), 0.0)
 
     def gain(self, points: Float32, ways: Ways) -> Float32:  # noqa: ARG002 - it shines alike from all its points
         """Smoothstep between the cone's edge and its softer inside, by the angle seen in the lamp's own axes."""
-        local = np.tensordot(self.inverse_axes.T.astype(np.float32), ways.towards, axes=1)
+        axes = np.moveaxis(self.inverse_axes, (-2, -1), (0, 1)).astype(np.float32)
+        local = np.einsum("ij...,ir...->jr...", axes, ways.towards)
         depth = local[2] / np.sqrt(np.maximum((local * local).sum(axis=0), np.float32(1e-30)))
         step = np.clip((depth - np.float32(self.cosine)) / np.float32(self.softness), 0, 1)
         return step * step * (3 - 2 * step)

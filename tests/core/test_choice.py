@@ -39,7 +39,7 @@ def test_what_is_dark_is_never_asked_and_few_lights_are_asked_for_sure():
 def test_lights_are_drawn_as_often_as_their_chances_say():
     rng = np.random.default_rng(2)
     chance = chances(rng.random((20, 1)) ** 2, 6)
-    drawn = draw(np.repeat(chance, TRIES, axis=1), rng.random(TRIES))
+    drawn = draw(np.repeat(chance, TRIES, axis=1), rng.random((1, TRIES)))[0]
     assert (drawn.sum(axis=0) == 6).all()
     error = np.sqrt(chance[:, 0] * (1 - chance[:, 0]) / TRIES)
     assert (np.abs(drawn.mean(axis=1) - chance[:, 0]) <= 4 * error).all()

@@ -115,7 +115,7 @@ def test_only_ways_that_meet_a_veil_take_more_than_one_ray(build):
         visibility = Visibility(patches.corners, patches.optics)
         points = np.array([[3.0, 0.4, 0.01], [-0.6, -0.4, 0.01], [-0.6, 0.4, 0.01]])
         origins = patches.space.normalise(points).astype(np.float32)
-        ways = (patches.space.normalise(points + [0, 0, 2.0]) - origins).astype(np.float32)
+        ways = (patches.space.normalise(points + np.array([0, 0, 2.0])) - origins).astype(np.float32)
         passed[name] = visibility.veiled_along(origins, ways)
     np.testing.assert_array_equal(passed["alone"].tint[:, 0], [1.0, 0.5, 0.5])
     np.testing.assert_array_equal(passed["below"].tint[:, 0], [1.0, 0.5, 0.0])
