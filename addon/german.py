@@ -485,6 +485,8 @@ SENTENCES |= {
     "Switch to Object Mode to bake": "Zum Backen in den Objektmodus wechseln",
     "Nothing to bake: no object with faces was chosen. Select a mesh object and bake again.": "Nichts zu backen: kein "
     "Objekt mit Flächen ist gewählt. Ein Netzobjekt wählen und erneut backen.",
+    "Nothing to bake: the faces of {names} have no area. Check its scale, or delete them.": "Nichts zu backen: die "
+    "Flächen von {names} haben keinen Inhalt. Skalierung prüfen, oder sie löschen.",
     "Scene '{name}' has no mesh object that is visible to rendering: add one, or switch its camera icon on in the "
     "Outliner.": "Szene '{name}' hat kein Netzobjekt, das beim Rendern sichtbar ist: eines hinzufügen oder sein "
     "Kamerasymbol in der Gliederung einschalten.",

@@ -7,11 +7,15 @@ from dataclasses import replace
 import numpy as np
 
 from .cost import refuse_without_room
+from .patches import triangle_geometry
 from .plan import Plan
 from .scene import ALBEDO_LIMIT, AreaLamp, Scene, SceneError, SceneObject, SkyMap, Surface
 
 #: Beyond this many half extents from the origin, single precision shows in the result.
 _FAR = 1e5
+
+#: Share of their squared extent that the faces to be baked must cover: less is the rounding of none.
+_NO_AREA = 1e-14
 
 #: Output triangles beyond which no machine that Blender runs on holds a bake.
 _MOST_CELLS = 20_000_000
@@ -34,6 +38,7 @@ def check_scene(scene: Scene) -> Scene:
         raise SceneError("Nothing to bake: no object with faces was chosen. Select a mesh object and bake again.")
     for scene_object in objects:
         _check_object(scene_object, len(scene.surfaces))
+    _check_area([o for o in objects if o.receives])
     warnings = list(scene.warnings)
     surfaces = tuple(_check_surface(surface, warnings) for surface in scene.surfaces)
     for lamp in scene.lamps:
@@ -74,6 +79,18 @@ def _check_object(scene_object: SceneObject, surfaces: int) -> None:
         np.isfinite(scene_object.colors).all() and scene_object.colors.min() >= 0
     ):
         raise SceneError(f"'{name}' has vertex colours that are negative or not numbers: paint it again.")
+
+
+def _check_area(receivers: list[SceneObject]) -> None:
+    if not any(map(_has_area, receivers)):
+        names = ", ".join(f"'{o.name}'" for o in receivers[:3])
+        raise SceneError(f"Nothing to bake: the faces of {names} have no area. Check its scale, or delete them.")
+
+
+def _has_area(scene_object: SceneObject) -> bool:
+    corners = scene_object.vertices[scene_object.triangles]
+    extent = float(np.ptp(corners.reshape(-1, 3), axis=0).max())
+    return float(triangle_geometry(corners)[1].sum()) > _NO_AREA * extent**2
 
 
 def _check_surface(surface: Surface, warnings: list[str]) -> Surface:

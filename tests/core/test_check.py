@@ -46,6 +46,7 @@ BAD = {
         lambda s: with_object(s, triangles=np.zeros((0, 3), np.int32), surface=np.zeros(0, np.int32)),
         "Nothing",
     ),
+    "no area": (lambda s: with_object(s, vertices=s.objects[0].vertices * 0), "'Floor' have no area"),
     "no receiver": (lambda s: with_object(s, receives=False), "Nothing to bake"),
     "vertex too high": (lambda s: with_object(s, triangles=np.array([[0, 1, 4], [0, 2, 3]], np.int32)), "'Floor'"),
     "vertex negative": (lambda s: with_object(s, triangles=np.array([[0, 1, -1], [0, 2, 3]], np.int32)), "'Floor'"),
