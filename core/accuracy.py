@@ -23,10 +23,10 @@ from .scene import Float64
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fit: alpha; vertex values (v, k) of all samples together, and their mean light (v,); squared error of each cell
-    (c,) by sampling and by resolution, of the mean light."""
+    """A fit: alpha (v,); vertex values (v, k) of all samples together, and their mean light (v,); squared error of each
+    cell (c,) by sampling and by resolution, of the mean light."""
 
-    alpha: float
+    alpha: Float64
     values: Float64
     grey: Float64
     sampling: Float64
@@ -61,6 +61,8 @@ UNKNOWN = ErrorEstimate(np.inf, np.inf, np.inf)
 
 #: How much the fit may weigh smoothness, from hardly to a lot.
 ALPHAS = (0.02, 0.5, 5.0, 50.0)
+#: Share of the vertices that are too few to go on smoothing for.
+_FEW = 0.01
 #: Mean squared jump of the gradient over mean squared error, of the least smooth fit of a step and of a parabola.
 STEP_BEND, PARABOLA_BEND = 6.0, 70.0
 #: Relative error up to which the halves are fitted: they only tell errors that are larger.
@@ -76,45 +78,52 @@ COARSENING = 3.0**0.75 - 1.0
 
 
 def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -> Fitted:
-    """Fit with the alpha at which each half of the samples best predicts the other (cross-validation), judged by the
-    mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what a squared error of the light there
-    counts."""
+    """Fit with the alpha at which, around each vertex, each half of the samples best predicts the other
+    (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
+    a squared error of the light there counts."""
     merged = halves[0] + halves[1]
     limits = fit.limits(merged)
     grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
     tried: list[_Halves] = []
     start: list[Float64 | None] = [None, None]
+    smoother = fit.measured
+    level = np.zeros(len(smoother), dtype=np.int64)
     for alpha in ALPHAS:
         values = [fit.solve(system, alpha, begin, _ROUGH) for system, begin in zip(systems, start, strict=True)]
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
         low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
         first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
-        tried.append(_Halves(alpha, first, second, predicted))
-        if len(tried) > 1 and area @ predicted > area @ tried[-2].predicted:
-            tried.pop()
-            break
-        if alpha == ALPHAS[0]:
+        if tried:
+            smoother = smoother & (fit.nearby(area * (tried[-1].predicted - predicted)) > 0.0)
+            if smoother.sum() <= _FEW * len(smoother):
+                break
+            level[smoother] = len(tried)
+        else:
             bend = fit.bending(*values)
+        tried.append(_Halves(first, second, predicted))
         start = [*values]
-    sharpest, best = tried[0], tried[-1]
+    sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
     distance = sharpest.predicted - sharpest.spread / 2.0
     unseen = _unresolved(bend, distance, own_noise, area * shown)
     # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
     unseen[fit.broken] = np.maximum((distance - own_noise)[fit.broken], unseen[fit.broken])
-    together = fit.solve_within(fit.system(merged), best.alpha, limits)
-    return Fitted(
-        best.alpha, together, together @ halves[0].to_grey, best.spread / 4.0, unseen + best.smoothed_by(sharpest)
-    )
+    sampling = np.zeros_like(area)
+    for number, smoothed in enumerate(tried):
+        share = (own_level == number).mean(axis=1)
+        sampling += share * smoothed.spread / 4.0
+        unseen += share * smoothed.smoothed_by(sharpest)
+    chosen = np.array(ALPHAS)[level]
+    together = fit.solve_within(fit.system(merged), chosen, limits)
+    return Fitted(chosen, together, together @ halves[0].to_grey, sampling, unseen)
 
 
 @dataclass(frozen=True, eq=False)
 class _Halves:
     """The fits of both halves at the cells' corners (c, 3), and how well each predicts the other's samples (c,)."""
 
-    alpha: float
     first: Float64
     second: Float64
     predicted: Float64

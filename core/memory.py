@@ -191,7 +191,7 @@ def _ledger(last: _Last, changes: dict[str, Float64]) -> dict[str, float]:
     return ledger
 
 
-def _response(baked: Baked, name: str, alphas: tuple[float, ...], workers: Workers, rays: Counter[str]) -> _Response:
+def _response(baked: Baked, name: str, alphas: tuple[Float64, ...], workers: Workers, rays: Counter[str]) -> _Response:
     """The light of one lamp alone, in plain white, with the smoothing of the whole. Counts its rays by purpose."""
     plan, survey = baked.plan, baked.survey
     effort, seed, black = replace(plan.effort, emitters_by_rays=False), survey.seed, Sky.of((0.0, 0.0, 0.0))

@@ -8,8 +8,10 @@ space and jump nowhere, so the mean of every connected surface is kept exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .receivers import Receivers, numbered_edges, shared_edges
 from .scene import Bool, Float64, Int32
@@ -28,12 +30,17 @@ _ADDED, _MOST_RINGS = 5e-3, 30
 _WEIGHTLESS = 1e-12
 #: Samples that together weigh less than this at a vertex, where one has a third on average, say nothing of it.
 _MEASURED = 0.02
+#: How many steps from vertex to vertex lead over the surroundings that tell how smooth a fit should be.
+_RINGS = 8
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 #: Which of these six belongs to each side of a triangle.
 _SIDE_MOMENT = np.array([3, 5, 4])
 #: The pairs of the four vertices around an edge: its ends, each end and each apex, the apexes.
 _SIDE_START, _SIDE_END = np.array([0, 0, 1, 0, 1, 2]), np.array([1, 2, 2, 3, 3, 3])
+
+#: How much the jumps of the gradient weigh: everywhere the same, or for each vertex (v,).
+Smoothing: TypeAlias = "float | Float64"
 
 
 class Samples:
@@ -133,12 +140,8 @@ class Fit:
         self._surrounded = np.bincount(jumps.vertices[:, :2].ravel(), minlength=self._count) == around
         apexes = jumps.vertices[:, 2:]
         self._pattern = SymmetricPattern(self._count, np.concatenate([self._edge_ends, apexes]).astype(np.int64))
-        self._penalty = np.bincount(
-            jumps.vertices.ravel(), (jumps.weight[:, None] * jumps.jump**2).ravel(), self._count
-        ).astype(np.float64)
-        products = jumps.weight[:, None] * jumps.jump[:, _SIDE_START] * jumps.jump[:, _SIDE_END]
-        on_edges = np.bincount(self._edge.ravel()[jumps.sides].ravel(), products[:, :-1].ravel(), len(self._edge_ends))
-        self._pair_penalty = np.concatenate([on_edges, products[:, -1]])
+        self._jumps = jumps
+        self._penalty, self._pair_penalty = self._penalties(jumps.weight)
 
     def system(self, samples: Samples) -> System:
         """Mass matrix and right-hand side of one set of samples, each cell weighing as much as its area in sight."""
@@ -155,9 +158,10 @@ class Fit:
         )
 
     def solve(
-        self, system: System, alpha: float, start: Float64 | None = None, tolerance: float | None = None
+        self, system: System, alpha: Smoothing, start: Float64 | None = None, tolerance: float | None = None
     ) -> Float64:
-        """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha.
+        """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha, everywhere
+        the same or for each vertex (v,).
 
         start (v, k): where to begin; by default plain averaging, which is near already. tolerance: relative error; by
         default a tenth of the finest that is asked for.
@@ -166,7 +170,7 @@ class Fit:
         most = _TOLERANCE if tolerance is None else tolerance
         return conjugate_gradients(self.matrix(system, alpha), system.target, start, most, _MAXIMUM_ITERATIONS)
 
-    def solve_within(self, system: System, alpha: float, limits: tuple[Float64, Float64]) -> Float64:
+    def solve_within(self, system: System, alpha: Smoothing, limits: tuple[Float64, Float64]) -> Float64:
         """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
 
         Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
@@ -239,11 +243,34 @@ class Fit:
         # A sample of a hardly lit place may be below zero, so that many are right on average.
         return np.maximum(low - beyond, 0.0), np.maximum(high + beyond, 0.0)
 
-    def matrix(self, system: System, alpha: float) -> SymmetricMatrix:
-        """The mass plus alpha times the penalty."""
-        pairs = alpha * self._pair_penalty
+    def matrix(self, system: System, alpha: Smoothing) -> SymmetricMatrix:
+        """The mass plus alpha times the penalty; a jump between vertices of several alphas (v,) has their geometric
+        mean."""
+        if isinstance(alpha, np.ndarray):
+            smoothing = np.exp(np.log(alpha)[self._jumps.vertices].mean(axis=1))
+            penalty, pairs = self._penalties(smoothing * self._jumps.weight)
+        else:
+            penalty, pairs = alpha * self._penalty, alpha * self._pair_penalty
         pairs[: len(system.edges)] += system.edges
-        return SymmetricMatrix(self._pattern, system.diagonal + alpha * self._penalty, pairs)
+        return SymmetricMatrix(self._pattern, system.diagonal + penalty, pairs)
+
+    def _penalties(self, weight: Float64) -> tuple[Float64, Float64]:
+        """The squared jumps, each as heavy as weight (j,): diagonal (v,), and a value for each pair of the pattern."""
+        vertices, jump, sides = self._jumps.vertices, self._jumps.jump, self._jumps.sides
+        diagonal = np.bincount(vertices.ravel(), (weight[:, None] * jump**2).ravel(), self._count).astype(np.float64)
+        products = weight[:, None] * jump[:, _SIDE_START] * jump[:, _SIDE_END]
+        on_edges = np.bincount(self._edge.ravel()[sides].ravel(), products[:, :-1].ravel(), len(self._edge_ends))
+        return diagonal, np.concatenate([on_edges, products[:, -1]])
+
+    def nearby(self, amounts: Float64) -> Float64:
+        """(v,) how much of the amounts of the cells (c,) there is around each vertex, spread as far as _RINGS steps of
+        chance lead from vertex to vertex: over some hundred cells, but over no edge where the fit breaks."""
+        spread = SymmetricMatrix(self._pattern, np.ones(self._count), np.ones(len(self._pair_penalty)))
+        share = 1.0 / (spread @ np.ones((self._count, 1)))
+        near = self._scatter(np.repeat(amounts[:, None], 3, axis=1))[:, None]
+        for _ in range(_RINGS):
+            near = spread @ (share * near)
+        return np.asarray(near[:, 0])
 
     def bending(self, one: Float64, other: Float64) -> Float64:
         """(c,) mean over each cell of the product of the gradient's jumps in two fits (v, 1): their common squared
@@ -253,7 +280,7 @@ class Fit:
         around = self._scatter(np.repeat(self._receivers.cells.area[:, None] / 3.0, 3, axis=1))
         return np.asarray((energy / np.maximum(around, np.finfo(float).tiny))[self._corner].mean(axis=1))
 
-    def at_corners(self, values: Float64) -> Float64:
+    def at_corners(self, values: NDArray[Any]) -> NDArray[Any]:
         """(c, 3, ...): what interpolation of vertex values (v, ...) starts from in each cell's output triangle."""
         return values[self._corner]
 
@@ -296,11 +323,11 @@ class Fit:
         return beside
 
 
-def within(limits: tuple[Float64, Float64], alpha: float) -> tuple[Float64, Float64]:
+def within(limits: tuple[Float64, Float64], alpha: Smoothing) -> tuple[Float64, Float64]:
     """The limits that a fit so smooth has to keep: those of the samples around a vertex if it may overshoot; none but
     zero if it averages over many more, for then each of them is mostly noise, and far from where their mean lies."""
-    low, high = limits
-    return limits if alpha < _NOISY else (np.zeros_like(low), np.full_like(high, _ENDLESS))
+    noisy = np.reshape(np.asarray(alpha) >= _NOISY, (-1, 1))
+    return np.where(noisy, 0.0, limits[0]), np.where(noisy, _ENDLESS, limits[1])
 
 
 @dataclass(frozen=True, eq=False)

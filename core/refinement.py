@@ -31,7 +31,7 @@ _MOST_ROUNDS, _MOST_GROWTH = 3, 4
 class Light:
     """Fitted light at the vertices (v, ...): irradiance W/m^2 by where it came from, and how far it can be trusted.
 
-    reflected, sky, emitted, lamps (v, 3); alphas: the smoothing of direct and, if any, indirect light; error;
+    reflected, sky, emitted, lamps (v, 3); alphas (v,): the smoothing of direct and, if any, indirect light; error;
     cell_error (c,) mean square of each cell's radiance error. No valid sample tells of some vertices (v,): they were
     filled from their neighbours, or are hidden so deep inside solids that they stay dark.
     buried (e,): output triangles inside solids.
@@ -41,7 +41,7 @@ class Light:
     sky: Float64
     emitted: Float64
     lamps: Float64
-    alphas: tuple[float, ...]
+    alphas: tuple[Float64, ...]
     error: ErrorEstimate
     cell_error: Float64
     filled: Bool
@@ -167,7 +167,7 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)
 
 
-def fit_alone(survey: Survey, alphas: tuple[float, ...]) -> Light:
+def fit_alone(survey: Survey, alphas: tuple[Float64, ...]) -> Light:
     """The light with a smoothing that is given, and with nothing known of its error."""
     fit = Fit(survey.receivers, survey.lumped, survey.invalid)
     values = []
@@ -200,7 +200,7 @@ def average_light(survey: Survey) -> Light:
 def _light(
     survey: Survey,
     values: list[Float64],
-    alphas: tuple[float, ...],
+    alphas: tuple[Float64, ...],
     error: ErrorEstimate,
     cell_error: Float64,
     fit: Fit | None,

@@ -109,6 +109,29 @@ def test_the_stated_error_is_the_true_one(floor, noise):
     assert 0.7 < np.sqrt(stated / true) < 1.5
 
 
+def test_light_is_smoothed_where_it_is_smooth(build):
+    """Waves on one half of the floor, nothing on the other, noise on both: no single smoothing is as good for both."""
+    scene = Scene((build.quad(),), (build.grey,))
+    floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
+    rng, everywhere = np.random.default_rng(4), np.zeros(len(floor.cells), bool)
+
+    def light(points):
+        return 1.0 + 0.5 * np.sin(12.0 * np.pi * np.minimum(points[:, 0], 0.0))
+
+    halves = [sample(floor, light, 2, rng, noise=0.2) for _ in range(2)]
+    fit = Fit(floor, halves[0].lumped, everywhere)
+    fitted = fit_halves(fit, halves, floor.cells.area, np.ones(len(floor.cells)))
+    place = np.zeros(floor.vertices)
+    place[floor.corner_vertex] = floor.element_corners[..., 0]
+    assert np.median(fitted.alpha[place > 0.3]) == ALPHAS[-1]
+    assert np.median(fitted.alpha[place < -0.3]) < 0.1 * ALPHAS[-1]
+    merged = halves[0] + halves[1]
+    system, limits = fit.system(merged), fit.limits(merged)
+    alike = [fit.solve_within(system, alpha, limits) for alpha in ALPHAS]
+    errors = [squared_error(floor, light, fit.at_corners(values)[..., 0], rng) for values in (fitted.values, *alike)]
+    assert errors[0] < 0.8 * min(errors[1:])
+
+
 def test_two_witnesses_count_by_what_they_know():
     """A thousand cells that agree are sure to one part in a thousand; two that contradict each other know nothing."""
     many, few = np.tile([1.0, 3.0], 500), np.array([1.0, 3.0])
