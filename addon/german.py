@@ -334,9 +334,9 @@ SENTENCES = {
     "every surface is black": "jede Fläche ist schwarz",
     "as the original program did: centroid form factors, plain shooting": "wie im ursprünglichen Programm: "
     "Schwerpunkt-Formfaktoren, einfaches Verteilen",
-    "surfaces reflect {share}: after bounce {number} the next would add {rest} in a closed "
-    "room": "Flächen reflektieren {share}: nach Reflexion {number} brächte die nächste in einem geschlossenen Raum "
-    "{rest}",
+    "all at once, for fewer take no less time: surfaces reflect {share}, and bounce {number} adds {rest} in a closed "
+    "room": "alle auf einmal, denn weniger sparen keine Zeit: Flächen reflektieren {share}, und Reflexion {number} "
+    "bringt in einem geschlossenen Raum {rest}",
     "surfaces reflect {share} at most: no bounce would show": "Flächen reflektieren höchstens {share}: keine Reflexion "
     "wäre zu sehen",
     "every surface is opaque": "jede Fläche ist undurchsichtig",

@@ -87,8 +87,8 @@ def test_unused_materials_count_for_nothing(ground):
 
 def test_the_number_of_bounces_that_matter(ground):
     """0.5 ** 9 is the first power of one half under 0.2 %, a tenth of the asked error: what the ninth would add."""
-    assert "after bounce 8 the next would add 0.20% in a closed room" in effects(ground)["bounces"].reason
-    assert "after bounce 3 the next would add 6.25%" in effects(ground, error=0.8)["bounces"].reason
+    assert "bounce 9 adds 0.20% in a closed room" in effects(ground)["bounces"].reason
+    assert "bounce 4 adds 6.25%" in effects(ground, error=0.8)["bounces"].reason
 
 
 def test_bounces_that_add_less_than_a_tenth_of_the_asked_error_are_left_out(ground):
