@@ -194,19 +194,22 @@ class Contours:
         counts = np.where(outline.any(axis=0), _COVERED, -1)
         step = ((changes[:, crossed] & counts) != 0).argmax(axis=0)
         low, high, before = _PLACES[step], _PLACES[step + 1], seen[step, crossed]
+        # From here on only what differs is looked at: of many lights that are mostly one.
+        differs = changes[step, crossed] & counts
         edges = edges.only(crossed)
         for _ in range(_HALVINGS):
             middle = (low + high) / 2.0
-            same = ((self._on_edges(receivers, edges, middle) ^ before) & counts) == 0
+            same = ((self._on_edges(receivers, edges, middle, differs) ^ before) & differs) == 0
             low, high = np.where(same, middle, low), np.where(same, high, middle)
-        after = self._on_edges(receivers, edges, high)
-        inward = (after >= _COVERED).astype(np.int64) - (before >= _COVERED)
+        inward = np.where(differs >= _COVERED, np.where(before >= _COVERED, -1, 1), 0)
         return crossed, (low + high) / 2.0, inward
 
-    def _on_edges(self, receivers: Receivers, edges: _Edges, place: Float64) -> Int64:
+    def _on_edges(self, receivers: Receivers, edges: _Edges, place: Float64, differs: Int64 | None = None) -> Int64:
+        """What is in sight (e,) of a place (e,) on each edge; of the lights only those that differ (e,)."""
         start = Points(receivers.cells, edges.cell, edges.weights(np.full(len(place), _PLACES[0])))
         points = Points(receivers.cells, edges.cell, edges.weights(place))
-        return self._sight(points, GAP * edges.length) + _BARRED * self._barred(start, points.positions)
+        asked = None if differs is None else differs | differs >> _WHOLE
+        return self._sight(points, GAP * edges.length, asked) + _BARRED * self._barred(start, points.positions)
 
     def _barred(self, points: Points, targets: Float64) -> Bool:
         """Whether something stands on the surface between points and targets (n, 3) on it."""
@@ -218,14 +221,15 @@ class Contours:
         self.rays["contact"] += len(long)
         return barred
 
-    def _sight(self, points: Points, reach: Float64 | None) -> Int64:
-        """What is in sight (n,) of each point; with a reach (n,), also whether it is covered."""
+    def _sight(self, points: Points, reach: Float64 | None, asked: Int64 | None = None) -> Int64:
+        """What is in sight (n,) of each point; with a reach (n,), also whether it is covered. asked (n,): bits of the
+        lights to look for, None for all."""
 
         def work(_: int, part: slice) -> tuple[Int64, Counter[str]]:
             where = points.positions[part], points.normals[part]
             sight, rays = np.zeros(len(where[0]), dtype=np.int64), Counter[str]()
             if self._lights:
-                some, whole, rays["shadow"] = self._light.shadows(*where)
+                some, whole, rays["shadow"] = self._light.shadows(*where, None if asked is None else asked[part])
                 sight = some | whole << _WHOLE
             if reach is not None and self._around is not None:
                 looks = self._around.hemispheres

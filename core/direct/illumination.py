@@ -123,10 +123,12 @@ class DirectLight:
             self._shoot(tally, tree, rays, rng)
         return tally.illumination()
 
-    def shadows(self, points: Float64, normals: Float64) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
+    def shadows(
+        self, points: Float64, normals: Float64, asked: NDArray[np.int64] | None = None
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64], int]:
         """Lights of which some is hidden from each point (n, 3) by something else than the surface itself, with normals
         (n, 3), and lights that are hidden as a whole: two numbers (n,), a bit for each light; and the rays it took.
-        What shines through veils is not hidden."""
+        What shines through veils is not hidden. asked (n,): bits of the lights to ask there, None for all."""
         along = np.stack([points.T, normals.T, normals.T]).astype(np.float32)
         origins = offset_along(points, normals)
         some, whole = np.zeros((2, len(points)), dtype=np.int64)
@@ -134,7 +136,8 @@ class DirectLight:
         for number, light in enumerate(self.lights):
             if not light.casts_shadow:
                 continue
-            lit = np.flatnonzero(light.share(points, normals) > 0)
+            lit = np.arange(len(points)) if asked is None else np.flatnonzero(asked >> number & 1)
+            lit = lit[light.share(points[lit], normals[lit]) > 0]
             rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
             towards = light.aim(along[0][:, lit], np.repeat(rim, len(lit), axis=2)).towards
             below = (towards * along[1][:, None, lit]).sum(axis=0) <= 0
