@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 from math import radians
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -113,13 +114,24 @@ SCENES: dict[str, Callable[[], Objects]] = {
     scene.__name__: scene for scene in (cornell_box, doorway, courtyard, curved_meshes, white_room, hall)
 }
 
+#: Beside them, the samples.
+SAMPLES = ("cornell_box_area_lamp", "cornell_box_emitter", "living_room", "stage")
+_SAMPLES = Path(__file__).resolve().parents[2] / "sample_blends"
+
 
 def build(name: str) -> Objects:
-    """Start from an empty file, build the scene and select what is to be baked."""
+    """Start from an empty file, build the scene, or open the sample, and select what is to be baked."""
+    if name in SAMPLES:
+        bpy.ops.wm.open_mainfile(filepath=str(_SAMPLES / f"{name}.blend"), load_ui=False)
+        made = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and not obj.hide_render]
+        return _selected(made)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.world = bpy.data.worlds.new("World")
     _world((0.0, 0.0, 0.0))
-    made = SCENES[name]()
+    return _selected(SCENES[name]())
+
+
+def _selected(made: Objects) -> Objects:
     for obj in bpy.context.scene.objects:
         obj.select_set(obj in made)
     bpy.context.view_layer.objects.active = made[0]

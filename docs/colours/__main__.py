@@ -1,4 +1,4 @@
-"""Measures the scenes of the benchmark, all or those named, and renews their rows in docs/vertex_colours.md."""
+"""Measures the scenes of the benchmark and the samples, all or those named: their rows in docs/vertex_colours.md."""
 
 from __future__ import annotations
 
@@ -6,10 +6,11 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..bench.scenes import SCENES
+from ..bench.scenes import SAMPLES, SCENES
 from .measure import Measured, Scale, measure
 
 DOCS = Path(__file__).resolve().parents[1]
+ALL = [*SCENES, *SAMPLES]
 CACHE = DOCS.parent / "build" / "bench"
 BEGIN, END = "<!-- measured -->\n", "<!-- end -->\n"
 _HEAD = ["scene", "triangles that follow the light", "a bake", "converged", "even triangles", "converged", "best fit",
@@ -23,7 +24,7 @@ def document(text: str, measured: Sequence[Measured]) -> str:
     rows = {line.split(" | ")[0].removeprefix("| "): line for line in table.splitlines()[2:]}
     rows |= {one.scene: f"| {' | '.join(_cells(one))} |" for one in measured}
     lines = [f"| {' | '.join(_HEAD)} |", f"| --- |{' ---: |' * (len(_HEAD) - 1)}"]
-    lines += [rows[name] for name in SCENES if name in rows]
+    lines += [rows[name] for name in ALL if name in rows]
     return f"{head}{BEGIN}" + "".join(f"{line}\n" for line in lines) + f"{END}{tail}"
 
 
@@ -34,9 +35,9 @@ def _cells(one: Measured) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="make colours", description=__doc__)
-    parser.add_argument("scenes", nargs="*", choices=[*SCENES, []], help="measure these; else all")
+    parser.add_argument("scenes", nargs="*", choices=[*ALL, []], help="measure these; else all")
     report = DOCS / "vertex_colours.md"
-    for name in parser.parse_args().scenes or list(SCENES):
+    for name in parser.parse_args().scenes or ALL:
         one = measure(name, Scale(), CACHE)
         print(" | ".join(_cells(one)), flush=True)
         report.write_text(document(report.read_text(encoding="utf-8"), [one]), encoding="utf-8")

@@ -20,6 +20,7 @@ import numpy as np
 
 from ...addon.accuracy import Reference, with_corners
 from ...addon.oracle import corner_bake
+from ...addon.scene_reader import read_scene
 from ...core import accuracy, contours
 from ...core.comparison import radiance_at
 from ...core.plan import choose_effort
@@ -27,6 +28,7 @@ from ...core.reconstruction import Fit
 from ...core.scene import Float64
 from ...core.settings import Settings
 from ..bench.measure import Baked, bake_once, make_reference
+from ..bench.scenes import build
 
 _SEEDS = (1, 2)
 
@@ -37,25 +39,28 @@ class Scale:
     of bakes on even meshes, and of the best fit; samples of Cycles; how many times as many triangles the finer mesh
     has."""
 
-    points: int = 1_000
-    paths: int = 64
+    points: int = 4_000
+    paths: int = 256
     triangles: int = 12_000
     error: float = 0.02
     passes: int = 8
     best_passes: int = 32
-    samples: int = 16
+    samples: int = 64
     finer: int = 5
 
 
 @dataclass(frozen=True)
 class Error:
-    """Relative to the mean radiance; below `doubt`, two standard errors, it is too small for the reference."""
+    """Relative to the mean radiance, and how well it is known from so few points: `squared` and its standard error."""
 
-    value: float
-    doubt: float
+    squared: float
+    deviation: float
 
     def __str__(self) -> str:
-        return f"{self.value:.2%}" if self.value > self.doubt else f"< {self.doubt:.2%}"
+        if self.squared < 2.0 * self.deviation:
+            return f"< {np.sqrt(max(self.squared, 0.0) + 2.0 * self.deviation):.1%}"
+        value = np.sqrt(self.squared)
+        return f"{value:.1%} ± {self.deviation / (2.0 * value):.1%}"
 
 
 @dataclass(frozen=True)
@@ -105,11 +110,17 @@ def measure(name: str, scale: Scale, cache: Path) -> Measured:
 
 
 def _even(name: str, reference: Reference, triangles: int, passes: int) -> list[Baked]:
-    """Bakes on triangles of one size, which follow nothing."""
-    settings = Settings(triangles=triangles, error=None)
-    effort = replace(choose_effort(reference.scene, settings), coarsest=1.0, growth=0.0, passes=passes)
+    return [even_bake(name, triangles, passes, seed, reference) for seed in _SEEDS]
+
+
+def even_bake(name: str, triangles: int, passes: int, seed: int, reference: Reference | None = None) -> Baked:
+    """A bake on triangles of one size, which follow nothing."""
+    settings = Settings(triangles=triangles, error=None, seed=seed)
+    objects = build(name)
+    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=True)
+    effort = replace(choose_effort(scene, settings), coarsest=1.0, growth=0.0, passes=passes)
     with patch.object(contours.Contours, "cut", lambda _, receivers: (receivers, np.arange(len(receivers.cells)))):
-        return [bake_once(name, "", replace(settings, seed=seed), reference, effort) for seed in _SEEDS]
+        return bake_once(name, "", settings, reference, effort)
 
 
 @contextmanager
@@ -129,5 +140,5 @@ def _converged(values: list[Float64], reference: Reference) -> Error:
     one, other = (v[seen][:, None] - truth for v in values)
     pairs = list(permutations(range(truth.shape[1]), 2))
     squared = np.mean([(one[:, i] * other[:, j]).mean(axis=1) for i, j in pairs], axis=0)
-    doubt = 2.0 * squared.std() / np.sqrt(len(squared))
-    return Error(*(float(np.sqrt(max(s, 0.0)) / truth.mean()) for s in (squared.mean(), doubt)))
+    scale = float(truth.mean()) ** 2
+    return Error(float(squared.mean()) / scale, float(squared.std()) / np.sqrt(len(squared)) / scale)
