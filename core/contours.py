@@ -13,7 +13,7 @@ triangles of this size show it.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -31,8 +31,9 @@ from .visibility import offset_along
 #: Where edges are looked at, from one end to the other; and how far inside the triangle, relative to its height.
 _PLACES = np.array([0.02, 0.26, 0.5, 0.74, 0.98])
 _ASIDE = 2e-4
-#: Halvings that find a place on an edge; how often the pieces are looked at again, for more than one contour.
-_HALVINGS, _PASSES = 10, 4
+#: A place on an edge is found by looking between two others, so often, at so many places at once: less often would need
+#: more places, more often more calls. How often the pieces are looked at again, for more than one contour.
+_NARROWINGS, _BETWEEN, _PASSES = 4, 3, 4
 #: A cut nearer to an end than this, relative to the uncut cell, is none: it would leave a sliver.
 _SNAP = 0.015
 #: How far within what is covered a cut is put, relative to that: a little of its dark would show.
@@ -54,6 +55,8 @@ _BARRED_UP_TO = 0.98
 _CHUNK, _STREAM = 8192, 4_000_000
 #: Of more lights than this none breaks enough to be cut along.
 _MOST_LIGHTS = 16
+#: Irrational, so that no sum of places on a grid is another's.
+_MIX = np.sqrt([2.0, 3.0, 5.0])
 #: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
 #: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
 _WHOLE, _BARRED, _COVERED = _MOST_LIGHTS, 1 << 2 * _MOST_LIGHTS, 1 << 2 * _MOST_LIGHTS + 1
@@ -62,13 +65,14 @@ _WHOLE, _BARRED, _COVERED = _MOST_LIGHTS, 1 << 2 * _MOST_LIGHTS, 1 << 2 * _MOST_
 @dataclass(frozen=True, eq=False)
 class _Edges:
     """Edges of cells (e,): a cell that each belongs to; weights (e, 3) there of its first end, of its second and of the
-    corner opposite; length in the unit box."""
+    corner opposite; length in the unit box; a key that tells it from others, also when cells are numbered anew."""
 
     cell: Int64
     first: Float64
     second: Float64
     opposite: Float64
     length: Float64
+    key: Float64
 
     @classmethod
     def of(cls, receivers: Receivers, number: Int64) -> _Edges:
@@ -79,13 +83,15 @@ class _Edges:
         turned = vertex[each, corner] > vertex[each, (corner + 1) % 3]
         one, other = (corner + turned) % 3, (corner + ~turned) % 3
         corners, unit = receivers.cells.corners[cell], np.eye(3)
-        length = np.linalg.norm(corners[each, one] - corners[each, other], axis=1)
-        return cls(cell, unit[one], unit[other], unit[(corner + 2) % 3], length)
+        ends = corners[each, one], corners[each, other]
+        length = np.linalg.norm(ends[0] - ends[1], axis=1)
+        # Where an edge is and which way it faces tell it from all others; sums that are not of squares would be the
+        # same for both diagonals of a square.
+        key = sum(_mixed(end) ** 2 for end in ends) + _mixed(receivers.cells.normals[cell])
+        return cls(cell, unit[one], unit[other], unit[(corner + 2) % 3], length, key)
 
     def only(self, chosen: Int64) -> _Edges:
-        return _Edges(
-            self.cell[chosen], self.first[chosen], self.second[chosen], self.opposite[chosen], self.length[chosen]
-        )
+        return _Edges(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     def weights(self, place: Float64) -> Float64:
         """Weights (e, 3) of the places (e,) from the first end to the second, a little to the inside of the cell."""
@@ -95,16 +101,51 @@ class _Edges:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """Around points (n,): the indirect light; which of them are inside a solid or have something close above them; and
-    which have nothing within twice that, so that between the two there is an outline and not a slope."""
+    """On two sides of places: light (2, n), which is indirect; outlines (n,): where one side is inside a solid or has
+    something close above it, and the other has nothing within twice that, so that between them there is no slope."""
 
     light: Float64
-    hidden: Bool
-    open: Bool
+    outlines: Bool
 
-    def differs(self, other: _Look) -> Bool:
-        """Whether one is hidden and the other open (n,)."""
-        return np.asarray((self.hidden & other.open) | (other.hidden & self.open))
+
+@dataclass(frozen=True, eq=False)
+class _Crossings:
+    """Of edges (e,): a place from the first end to the second where a contour that matters crosses each, nan where none
+    does; and where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side.
+    """
+
+    place: Float64
+    inward: Int64
+
+    @classmethod
+    def none(cls, count: int) -> _Crossings:
+        return cls(np.full(count, np.nan), np.zeros(count, dtype=np.int64))
+
+    def __setitem__(self, chosen: Int64 | Bool, found: _Crossings) -> None:
+        self.place[chosen], self.inward[chosen] = found.place, found.inward
+
+    def __getitem__(self, chosen: Int64 | Bool) -> _Crossings:
+        return _Crossings(self.place[chosen], self.inward[chosen])
+
+
+class _Known:
+    """What has been found on edges, by their keys: most of them are asked for again after some cells were split."""
+
+    def __init__(self) -> None:
+        self._keys, self._found = np.zeros(0), _Crossings.none(0)
+
+    def recall(self, keys: Float64) -> tuple[Bool, _Crossings]:
+        """Which of the edges (e,) are known, and what was found on those."""
+        at = np.searchsorted(self._keys, keys)
+        known = np.zeros(len(keys), dtype=bool)
+        inside = at < len(self._keys)
+        known[inside] = self._keys[at[inside]] == keys[inside]
+        return known, self._found[at[known]]
+
+    def remember(self, keys: Float64, found: _Crossings) -> None:
+        every, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
+        place, inward = np.append(self._found.place, found.place), np.append(self._found.inward, found.inward)
+        self._keys, self._found = every, _Crossings(place[first], inward[first])
 
 
 class Contours:
@@ -121,6 +162,7 @@ class Contours:
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
         self._nothing_to_find = alone or (not self._lights and around is None)
         self._around = around and around.with_rays(_RAYS, stream(seed, "contour patterns"))
+        self._known = _Known()
         self._seed = seed
         self._workers = workers
 
@@ -135,16 +177,14 @@ class Contours:
         for _ in range(_PASSES):
             if not near.any():
                 break
-            number, ends = numbered_edges(receivers.cell_vertex)
+            number, _ = numbered_edges(receivers.cell_vertex)
             edges = _Edges.of(receivers, number)
-            crossed, place, inward = self._follow(receivers, edges, number, near)
-            margin = _SNAP * size[source[edges.cell[crossed]]] / edges.length[crossed]
-            place = _off_the_ends(place + _WITHIN * margin * inward, inward, margin)
-            contoured |= np.isin(number, crossed).any(axis=1)
-            at = np.full(len(ends), np.nan)
-            at[crossed] = place
-            receivers, piece = cut_cells(receivers, at[number])
-            near, contoured, source = np.isfinite(at[number]).any(axis=1)[piece], contoured[piece], source[piece]
+            found = self._follow(receivers, edges, number, near)
+            margin = _SNAP * size[source[edges.cell]] / edges.length
+            place = _off_the_ends(found.place + _WITHIN * margin * found.inward, found.inward, margin)
+            contoured |= np.isfinite(found.place)[number].any(axis=1)
+            receivers, piece = cut_cells(receivers, place[number])
+            near, contoured, source = np.isfinite(place[number]).any(axis=1)[piece], contoured[piece], source[piece]
         if contoured.any():
             receivers = replace(receivers, breaks=self._breaks(receivers, contoured))
         return receivers, source
@@ -165,51 +205,65 @@ class Contours:
             near |= self._barred(points, cells.corners[:, k])
         return np.asarray(near)
 
-    def _follow(self, receivers: Receivers, edges: _Edges, number: Int64, near: Bool) -> tuple[Int64, Float64, Int64]:
-        """Edges (n,) that contours cross, followed from the near (c,) cells on; see `_crossings`."""
-        known = np.zeros(len(edges.cell), dtype=bool)
-        found = [(np.zeros(0, dtype=np.int64), np.zeros(0), np.zeros(0, dtype=np.int64))]
-        while near.any():
+    def _follow(self, receivers: Receivers, edges: _Edges, number: Int64, near: Bool) -> _Crossings:
+        """Where contours cross the edges (e,), followed from the near (c,) cells on."""
+        asked = np.zeros(len(edges.cell), dtype=bool)
+        found = _Crossings.none(len(asked))
+        while True:
             fresh = np.unique(number[near])
-            fresh = fresh[~known[fresh]]
-            known[fresh] = True
+            fresh = fresh[~asked[fresh]]
+            if not len(fresh):
+                return found
+            asked[fresh] = True
+            found[fresh] = self._find(receivers, edges.only(fresh))
+            near = np.isfinite(found.place)[number].any(axis=1)
+
+    def _find(self, receivers: Receivers, edges: _Edges) -> _Crossings:
+        """Where contours that matter cross the edges."""
+        known, recalled = self._known.recall(edges.key)
+        found = _Crossings.none(len(known))
+        found[known] = recalled
+        fresh = np.flatnonzero(~known)
+        if len(fresh):
             some, place, inward = self._crossings(receivers, edges.only(fresh))
             shadow, contact = self._matter(receivers, edges.only(fresh[some]), place)
             matters = shadow | contact
-            found.append((fresh[some][matters], place[matters], (contact * inward)[matters]))
-            meets = np.zeros(len(known), dtype=bool)
-            meets[found[-1][0]] = True
-            near = meets[number].any(axis=1)
-        crossed, places, inwards = (np.concatenate(part) for part in zip(*found, strict=True))
-        return crossed, places, inwards
+            found[fresh[some][matters]] = _Crossings(place[matters], (contact * inward)[matters])
+            self._known.remember(edges.key[fresh], found[fresh])
+        return found
 
     def _crossings(self, receivers: Receivers, edges: _Edges) -> tuple[Int64, Float64, Int64]:
         """Edges (n,) along which what is in sight changes, a place (n,) of each where it does, and where from
         there (n,) what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side."""
-        seen = np.stack([self._on_edges(receivers, edges, np.full(len(edges.cell), place)) for place in _PLACES])
+        seen = self._on_edges(receivers, edges, np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(edges.cell))))
         changes = seen[1:] ^ seen[:-1]
         crossed = np.flatnonzero(changes.any(axis=0))
         # Where something is covered, that is all that counts.
         outline = changes[:, crossed] >= _COVERED
         counts = np.where(outline.any(axis=0), _COVERED, -1)
         step = ((changes[:, crossed] & counts) != 0).argmax(axis=0)
-        low, high, before = _PLACES[step], _PLACES[step + 1], seen[step, crossed]
+        low, width = _PLACES[step], np.diff(_PLACES)[step]
+        before, after = seen[step, crossed], seen[step + 1, crossed]
         # From here on only what differs is looked at: of many lights that are mostly one.
         differs = changes[step, crossed] & counts
-        edges = edges.only(crossed)
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2.0
-            same = ((self._on_edges(receivers, edges, middle, differs) ^ before) & differs) == 0
-            low, high = np.where(same, middle, low), np.where(same, high, middle)
+        edges, each = edges.only(crossed), np.arange(len(crossed))
+        for _ in range(_NARROWINGS):
+            width = width / (_BETWEEN + 1)
+            between = self._on_edges(receivers, edges, low + np.arange(1, _BETWEEN + 1)[:, None] * width, differs)
+            between = np.concatenate([between, after[None]])
+            first = (((between ^ before) & differs) != 0).argmax(axis=0)
+            low, after = low + first * width, between[first, each]
         inward = np.where(differs >= _COVERED, np.where(before >= _COVERED, -1, 1), 0)
-        return crossed, (low + high) / 2.0, inward
+        return crossed, low + width / 2.0, inward
 
-    def _on_edges(self, receivers: Receivers, edges: _Edges, place: Float64, differs: Int64 | None = None) -> Int64:
-        """What is in sight (e,) of a place (e,) on each edge; of the lights only those that differ (e,)."""
-        start = Points(receivers.cells, edges.cell, edges.weights(np.full(len(place), _PLACES[0])))
-        points = Points(receivers.cells, edges.cell, edges.weights(place))
-        asked = None if differs is None else differs | differs >> _WHOLE
-        return self._sight(points, GAP * edges.length, asked) + _BARRED * self._barred(start, points.positions)
+    def _on_edges(self, receivers: Receivers, edges: _Edges, places: Float64, differs: Int64 | None = None) -> Int64:
+        """What is in sight (p, e) at places (p, e) of the edges; of the lights only those that differ (e,)."""
+        every = edges.only(np.tile(np.arange(len(edges.cell)), len(places)))
+        start = Points(receivers.cells, every.cell, every.weights(np.full(places.size, _PLACES[0])))
+        points = Points(receivers.cells, every.cell, every.weights(places.ravel()))
+        asked = None if differs is None else np.tile(differs | differs >> _WHOLE, len(places))
+        sight = self._sight(points, GAP * every.length, asked) + _BARRED * self._barred(start, points.positions)
+        return sight.reshape(places.shape)
 
     def _barred(self, points: Points, targets: Float64) -> Bool:
         """Whether something stands on the surface between points and targets (n, 3) on it."""
@@ -245,59 +299,61 @@ class Contours:
         """Which of the crossed edges (e,) a sharp shadow crosses, and which the outline of what hides one side."""
         if not len(place):
             return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
-        low, high = np.full(len(place), _PLACES[0]), np.full(len(place), _PLACES[-1])
-        light, noise, looks, beside = [], [], [], []
-        for k, where in enumerate([low, np.maximum(place - _BESIDE, low), np.minimum(place + _BESIDE, high), high]):
-            points = Points(receivers.cells, edges.cell, edges.weights(where))
-            found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM + k, self._workers)
-            self.rays += found.rays
-            light.append(found.grey)
-            noise.append(np.sqrt(found.variance).mean(axis=1))
-            if 0 < k < 3:
-                beside.append(points)
-                looks.append(self._look(points, GAP * edges.length, k))
-        step = np.abs(light[2] - light[1])
-        sharp = (step > _SHARP * np.abs(light[3] - light[0])) & (step > _CONTRAST * np.maximum(light[1], light[2]))
-        sharp &= step > _SIGNIFICANT * np.hypot(noise[1], noise[2])
-        one, other = light[1] + looks[0].light, light[2] + looks[1].light
-        parted = self._barred(beside[0], beside[1].positions)
+        ends = np.broadcast_to(_PLACES[[0, -1], None], (2, len(place)))
+        beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), *ends)
+        every = edges.only(np.tile(np.arange(len(place)), 4))
+        where = every.weights(np.concatenate([beside, ends]).ravel())
+        points = Points(receivers.cells, every.cell, where)
+        found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
+        self.rays += found.rays
+        light, noise = found.grey.reshape(4, -1), np.sqrt(found.variance).mean(axis=1).reshape(4, -1)
+        step = np.abs(light[0] - light[1])
+        sharp = (step > _SHARP * np.abs(light[2] - light[3])) & (step > _CONTRAST * np.maximum(light[0], light[1]))
+        sharp &= step > _SIGNIFICANT * np.hypot(noise[0], noise[1])
+        sides = 2 * len(place)
+        points = Points(receivers.cells, every.cell[:sides], where[:sides])
+        look = self._look(points, GAP * every.length[:sides], 0)
+        one, other = light[:2] + look.light
+        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) :])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
-        return np.asarray(sharp | parted), looks[0].differs(looks[1])
+        return np.asarray(sharp | parted), look.outlines
 
     def _look(self, points: Points, reach: Float64, number: int) -> _Look:
-        """Looks around from points (n,), of which something within reach (n,) above them hides the light."""
+        """Looks around from points (2 n,) on two sides of n places, of which something within reach (2 n,) above them
+        hides the light."""
         around = self._around
         if around is None:
-            none = np.zeros(len(reach), dtype=bool)
-            return _Look(np.zeros(len(reach)), none, ~none)
+            return _Look(np.zeros((2, len(reach) // 2)), np.zeros(len(reach) // 2, dtype=bool))
         arriving, enclosed, rays = around.look(points, self._seed, _STREAM + number, self._workers)
         near, far = (
             around.hemispheres.covered(points.positions, points.normals, times * reach) for times in (1.0, 2.0)
         )
         self.rays += rays + Counter(contact=2 * len(reach))
-        return _Look(arriving, enclosed | near, ~enclosed & ~far)
+        hidden, open_ = (enclosed | near).reshape(2, -1), ~(enclosed | far).reshape(2, -1)
+        return _Look(arriving.reshape(2, -1), (hidden & open_[::-1]).any(axis=0))
 
     def _breaks(self, receivers: Receivers, near: Bool) -> Bool:
         """Sides (c, 3) of near (c,) cells with a light that is in sight as a whole on one side and hidden on the other,
         with an outline between them, or with something that stands between them."""
         here, there = shared_edges(receivers.cell_vertex)
         both = near[here[:, 0] // 3] & near[there[:, 0] // 3]
-        sides = np.stack([here[both, 0], _side(there[both])])
-        beside, sight, looks = [], [], []
-        for k, side in enumerate(sides):
-            each = np.arange(len(side))
-            weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
-            weights[each, (side + 2) % 3] = _BESIDE_SIDE
-            points = Points(receivers.cells, side // 3, weights)
-            beside.append(points)
-            sight.append(self._sight(points, None))
-            looks.append(self._look(points, GAP * points.size, 4 + k))
-        one, other = sight
-        parted = self._barred(beside[0], beside[1].positions)
+        side = np.concatenate([here[both, 0], _side(there[both])])
+        weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
+        weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
+        points = Points(receivers.cells, side // 3, weights)
+        one, other = self._sight(points, None).reshape(2, -1)
         jumps = (one >> _WHOLE & ~other | other >> _WHOLE & ~one) & ((1 << _WHOLE) - 1)
+        parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
+        broken = (jumps > 0) | parted | self._look(points, GAP * points.size, 1).outlines
         breaks = np.zeros(3 * len(near), dtype=bool)
-        breaks[sides[:, (jumps > 0) | looks[0].differs(looks[1]) | parted]] = True
+        breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
+
+
+def _mixed(vectors: Float64) -> Float64:
+    """A number (n,) for each of some vectors (n, 3), which hardly two of them share."""
+    x, y, z = vectors.T
+    return np.asarray(_MIX[0] * x + _MIX[1] * y + _MIX[2] * z)
 
 
 def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:

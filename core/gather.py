@@ -47,7 +47,7 @@ class Points:
         """Numbers of the points where light that arrives on the back counts too."""
         return np.flatnonzero((self.front < 1).any(axis=1)) if self.front is not None else np.empty(0, dtype=np.int64)
 
-    def only(self, chosen: np.ndarray) -> Points:
+    def only(self, chosen: np.ndarray | slice) -> Points:
         """Some of the points, as seen from their fronts alone."""
         some = copy(self)
         some.front = None

@@ -136,18 +136,20 @@ class DirectLight:
         for number, light in enumerate(self.lights):
             if not light.casts_shadow:
                 continue
-            lit = np.arange(len(points)) if asked is None else np.flatnonzero(asked >> number & 1)
-            lit = lit[light.share(points[lit], normals[lit]) > 0]
+            ask = np.arange(len(points)) if asked is None else np.flatnonzero(asked >> number & 1)
             rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
-            towards = light.aim(along[0][:, lit], np.repeat(rim, len(lit), axis=2)).towards
-            below = (towards * along[1][:, None, lit]).sum(axis=0) <= 0
-            ways = (towards - np.float32(OFFSET) * along[1][:, None, lit]).transpose(1, 2, 0).reshape(-1, 3)
-            ways = np.ascontiguousarray(ways, dtype=np.float32)
-            free = self.visibility.unblocked_along(np.tile(origins[lit], (len(below), 1)), ways)
-            hidden = ~free.reshape(below.shape) & ~below
-            some[lit] |= hidden.any(axis=0).astype(np.int64) << number
-            whole[lit] |= (hidden | below).all(axis=0).astype(np.int64) << number
-            rays += below.size
+            ways = light.aim(along[0][:, ask], np.repeat(rim, len(ask), axis=2))
+            gain = light.gain(along[0][:, ask], ways)
+            lit = (ways.solid if gain is None else ways.solid * gain.reshape(-1, *ways.solid.shape).max(axis=0)) > 0
+            lit &= (ways.towards * along[1][:, None, ask]).sum(axis=0) > 0
+            place, point = np.nonzero(lit)
+            towards = ways.towards[:, place, point] - np.float32(OFFSET) * along[1][:, ask[point]]
+            towards = np.ascontiguousarray(towards.T, dtype=np.float32)
+            hidden = np.zeros(lit.shape, dtype=bool)
+            hidden[lit] = ~self.visibility.unblocked_along(origins[ask[point]], towards)
+            some[ask] |= hidden.any(axis=0).astype(np.int64) << number
+            whole[ask] |= (lit.any(axis=0) & (hidden | ~lit).all(axis=0)).astype(np.int64) << number
+            rays += len(place)
         return some, whole, rays
 
     def _ask(self, light: Light, receivers: _Receivers, share: Float64, rays: int, rng: np.random.Generator) -> _Answer:
