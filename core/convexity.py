@@ -21,7 +21,7 @@ def nothing_stands_between(scene: Scene) -> bool:
     corners = np.concatenate([o.vertices[o.triangles] for o in scene.objects])
     normals, area = triangle_geometry(corners)
     corners, normals = corners[area > 0], normals[area > 0]
-    points = np.unique(corners.reshape(-1, 3), axis=0)
+    points = np.concatenate([o.vertices[np.unique(o.triangles)] for o in scene.objects])
     if len(corners) * len(points) > _WORTH or not len(points):
         return False
     extent = float(np.ptp(points, axis=0).max())

@@ -20,7 +20,7 @@ from .sampling import stream
 from .scene import SceneError
 
 #: Rays, and numbers, that measure how fast this machine is.
-_CALIBRATION = 1 << 15
+_CALIBRATION = 1 << 13
 #: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers or looks for
 #: a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
 _LOOK, _FORM_FACTOR, _FIT = 24.0, 60.0, 1000.0

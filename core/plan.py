@@ -274,7 +274,7 @@ class _Prices:
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = asked_error(settings)
-    finer = min(max(0.02 / asked, 0.25), 4.0)
+    finer = min(max(0.02 / asked, 0.1), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
     # Where light bends is no guide to where a texture has its detail.
