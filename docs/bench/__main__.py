@@ -31,9 +31,10 @@ HONEST = (0.7, 1.5)
 
 @dataclass(frozen=True)
 class Scale:
-    """triangles of the receivers before they are adapted; asked errors, whose middle makes the mesh for Cycles; samples
-    of Cycles; points of the reference and its paths; sizes of the growth; patches of the original scheme."""
+    """triangles of the even meshes that Cycles bakes too, and of those that follow the light, at most; asked errors;
+    samples of Cycles; points of the reference and its paths; sizes of the growth; patches of the original scheme."""
 
+    even: int
     triangles: int
     errors: tuple[float, ...]
     cycles: tuple[int, ...]
@@ -44,6 +45,7 @@ class Scale:
 
 
 FULL = Scale(
+    even=20_000,
     triangles=12_000,
     errors=(0.2, 0.1, 0.05, 0.03, 0.02, 0.01),
     cycles=(16, 64, 256),
@@ -53,26 +55,48 @@ FULL = Scale(
     patches=(1_000, 3_000, 10_000),
 )
 QUICK = Scale(
-    triangles=500, errors=(0.2, 0.1), cycles=(1, 4), points=100, paths=16, sizes=(500, 1_000), patches=(100, 300)
+    even=400,
+    triangles=500,
+    errors=(0.2, 0.1),
+    cycles=(1, 4),
+    points=100,
+    paths=16,
+    sizes=(500, 1_000),
+    patches=(100, 300),
 )
 #: Where growth is measured, and the original scheme: in a closed scene the light of its rows would grow for ever.
 _GROWING, _OPEN = "doorway", "cornell_box"
 
 
-def against_cycles(name: str, scale: Scale, threads: int) -> tuple[Reference, list[Run], list[Run]]:
-    """The reference, our bakes at each asked error, and Cycles' on the mesh of the middle one."""
-    reference = make_reference(name, scale.points, scale.paths, FOLDER)
-    middle = scale.errors[len(scale.errors) // 2]
-    ours = {}
-    for error in sorted(scale.errors, key=lambda e: e == middle):
-        settings = Settings(triangles=scale.triangles, error=error, threads=threads)
-        baked = bake_twice(name, f"{error:.0%} asked", settings, reference)
-        ours[error] = baked.run
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Bakes of one scene: of even meshes, that are kept, and of meshes that follow the light, at each asked error; and
+    Cycles' on the even meshes. references: of both kinds."""
+
+    references: tuple[Reference, Reference]
+    kept: list[Run]
+    own: list[Run]
+    cycles: list[Run]
+
+
+def against_cycles(name: str, scale: Scale, threads: int) -> Beside:
+    """One scene in all ways."""
+    even = make_reference(name, scale.points, scale.paths, FOLDER, scale.even)
+    kept, own = [], []
+    for error in scale.errors:
+        settings = Settings(tessellate=False, triangles=scale.even, error=error, threads=threads)
+        baked = bake_twice(name, f"{error:.0%} asked, even", settings, even)
+        kept.append(baked.run)
         _say(name, baked.run)
-    rivals = cycles_runs(baked, scale.cycles, reference, threads)
+    rivals = cycles_runs(baked, scale.cycles, even, threads)
     for run in rivals:
         _say(f"{name}, Cycles", run)
-    return reference, [ours[error] for error in scale.errors], rivals
+    modelled = make_reference(name, scale.points, scale.paths, FOLDER)
+    for error in scale.errors:
+        settings = Settings(triangles=scale.triangles, error=error, threads=threads)
+        own.append(bake_once(name, f"{error:.0%} asked", settings, modelled).run)
+        _say(name, own[-1])
+    return Beside((even, modelled), kept, own, rivals)
 
 
 def growth(scale: Scale, threads: int) -> Iterator[Run]:
@@ -117,44 +141,52 @@ def report(results: dict[str, Any]) -> str:
     return text
 
 
-def _ratios(scenes: dict[str, Any]) -> tuple[list[str], list[list[str]]]:
+def _ratios(scenes: dict[str, Beside]) -> tuple[list[str], list[list[str]]]:
     head: list[str] = []
     rows: list[list[str]] = []
     every: list[list[float]] = []
-    for name, (_, ours, rivals) in scenes.items():
-        row, wins = [_plain(name), f"{rivals[0].triangles:,}"], []
-        for rival in rivals:
-            wins += [(f"{m} of {rival.name}", sooner(ours, rival, m)) for m in ("noise", "surface")]
+    for name, beside in scenes.items():
+        wins = [(f"noise of {rival.name}", sooner(beside.kept, rival, "noise")) for rival in beside.cycles]
+        wins += [(f"error of {rival.name}", sooner(beside.kept, rival, "surface")) for rival in beside.cycles]
+        wins += [(f"error, own triangles, of {r.name}", sooner(beside.own, r, "surface")) for r in beside.cycles]
         every.append([win for _, win in wins])
-        rows.append([*row, *(_times(win) for win in every[-1])])
+        rows.append([_plain(name), f"{beside.cycles[0].triangles:,}", *(_times(win) for win in every[-1])])
         head = ["scene", "triangles", *(title for title, _ in wins)]
     # None as good is the slowest there can be: it counts as zero.
     rows.append(["**median**", "", *(_times(win) for win in np.median(np.nan_to_num(every), axis=0))])
     return head, rows
 
 
-def _runs(scenes: dict[str, Any], threads: int) -> tuple[list[str], list[list[str]]]:
+def _runs(scenes: dict[str, Beside], threads: int) -> tuple[list[str], list[list[str]]]:
     head = ["scene", "bake", "triangles", "patches", "Mrays", "seconds", "processor s", "of Embree alone",
             "predicted s", "noise", "surface error", "typical", "bias", "stated", "stated / true"]  # fmt: skip
     rows = []
-    for name, (_, ours, rivals) in scenes.items():
-        for run in [*ours, *rivals]:
-            own = run.patches > 0
-            rows.append([
-                _plain(name), run.name if own else f"Cycles, {run.name}", f"{run.triangles:,}",
-                f"{run.patches:,}" if own else "", f"{run.rays['total'] / 1e6:.2f}" if own else "",
-                f"{run.seconds:.2f}", f"{run.processor:.2f}",
-                f"{run.seconds * threads / run.embree:.1f} x" if own else "", f"{run.predicted:.2f}" if own else "",
-                f"{run.noise:.2%}", f"{run.surface:.2%}", f"{run.typical:.2%}", f"{run.bias:+.2%}",
-                f"{run.stated:.2%}" if own else "", f"{run.stated / run.surface:.2f}" if own else "",
-            ])  # fmt: skip
+    for name, beside in scenes.items():
+        rows += [_our_row(_plain(name), run, threads) for run in [*beside.kept, *beside.own]]
+        rows += [_rival_row(_plain(name), run) for run in beside.cycles]
     return head, rows
 
 
-def _honesty(scenes: dict[str, Any]) -> str:
-    ratios = [run.stated / run.surface for _, ours, _ in scenes.values() for run in ours]
+def _our_row(scene: str, run: Run, threads: int) -> list[str]:
+    return [
+        scene, run.name, f"{run.triangles:,}", f"{run.patches:,}", f"{run.rays['total'] / 1e6:.2f}",
+        f"{run.seconds:.2f}", f"{run.processor:.2f}", f"{run.seconds * threads / run.embree:.1f} x",
+        f"{run.predicted:.2f}", "" if np.isnan(run.noise) else f"{run.noise:.2%}", f"{run.surface:.2%}",
+        f"{run.typical:.2%}", f"{run.bias:+.2%}", f"{run.stated:.2%}", f"{run.stated / run.surface:.2f}",
+    ]  # fmt: skip
+
+
+def _rival_row(scene: str, run: Run) -> list[str]:
+    return [
+        scene, f"Cycles, {run.name}", f"{run.triangles:,}", "", "", f"{run.seconds:.2f}", f"{run.processor:.2f}", "",
+        "", f"{run.noise:.2%}", f"{run.surface:.2%}", f"{run.typical:.2%}", f"{run.bias:+.2%}", "", "",
+    ]  # fmt: skip
+
+
+def _honesty(scenes: dict[str, Beside]) -> str:
+    ours = [run for beside in scenes.values() for run in [*beside.kept, *beside.own]]
+    ratios, off = [run.stated / run.surface for run in ours], [run.predicted / run.seconds for run in ours]
     within = sum(HONEST[0] <= ratio <= HONEST[1] for ratio in ratios)
-    off = [run.predicted / run.seconds for _, ours, _ in scenes.values() for run in ours]
     good = sum(1 / 1.5 <= ratio <= 1.5 for ratio in off)
     return (
         f"Stated over true error: {within} of {len(ratios)} within {HONEST[0]} to {HONEST[1]}, smallest "
@@ -233,9 +265,9 @@ def _write(results: dict[str, Any], document: Path) -> None:
         "growth": [asdict(run) for run in results["growth"]],
         "original": [asdict(run) for run in results["original"]],
         "scenes": {
-            name: {"reference_noise": reference_noise(reference.radiance[reference.visible]),
-                   "ours": [asdict(r) for r in ours], "cycles": [asdict(r) for r in rivals]}
-            for name, (reference, ours, rivals) in results["scenes"].items()
+            name: {"reference_noise": [reference_noise(r.radiance[r.visible]) for r in beside.references],
+                   **{kind: [asdict(run) for run in getattr(beside, kind)] for kind in ("kept", "own", "cycles")}}
+            for name, beside in results["scenes"].items()
         },
     }  # fmt: skip
     (FOLDER / "bench.json").write_text(json.dumps(plain, indent=1), encoding="utf-8")

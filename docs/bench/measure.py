@@ -68,12 +68,15 @@ class Baked:
     copies: list[bpy.types.Object]
 
 
-def make_reference(name: str, points: int, samples: int, cache: Path) -> Reference:
-    """By Cycles, or from the folder `cache` if it was made before with the same arguments."""
+def make_reference(name: str, points: int, samples: int, cache: Path, triangles: int = 0) -> Reference:
+    """By Cycles, or from the folder `cache` if it was made before with the same arguments. triangles: about how many of
+    one size the meshes are made of, if they are not as they were modelled."""
     objects = build(name)
-    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=True)
+    if triangles:
+        subdivide(objects, triangles)
+    scene, _ = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=not triangles)
     at = scatter(scene, points, _SEED)
-    path = cache / f"{name}-{points}-{samples}.npz"
+    path = cache / f"{name}-{triangles or 'modelled'}-{points}-{samples}.npz"
     if path.exists() and np.array_equal(np.load(path)["position"], at.position):
         radiance = np.load(path)["radiance"]
     else:

@@ -45,14 +45,14 @@ def test_a_scene_beside_cycles_into_table_and_json(tmp_path, monkeypatch):
     assert text.startswith("# Speed\n\nOurs.\n\n")
     assert text.endswith(f"{bench.END}\nWords.\n")
     assert "old" not in text
-    assert text.count("| Courtyard |") == 1 + 2 + 2  # ratios; our bakes; Cycles'
+    assert text.count("| Courtyard |") == 1 + 2 + 2 + 2  # ratios; our bakes; Cycles'
     scene = json.loads((tmp_path / "bench.json").read_text(encoding="utf-8"))["scenes"]["courtyard"]
-    for run in scene["ours"]:
+    for run in [*scene["kept"], *scene["own"]]:
         assert 0 < run["embree"] < run["processor"]
         assert run["rays"]["gather"] > 0
     rough, fine = scene["cycles"]
     assert rough["noise"] == pytest.approx(2 * fine["noise"])  # four times the samples
-    assert rough["surface"] > fine["surface"] > scene["ours"][0]["surface"] > 0
+    assert rough["surface"] > fine["surface"] > scene["own"][0]["surface"] > 0
 
 
 @pytest.fixture
