@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from typing import Self, TypeVar
 
+from .blas import one_thread
 from .progress import Progress
 
 Result = TypeVar("Result")
@@ -29,10 +30,12 @@ class Workers:
         self._pool = ThreadPoolExecutor(self.threads, "radiosity")
 
     def __enter__(self) -> Self:
+        one_thread.__enter__()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=True, cancel_futures=True)
+        one_thread.__exit__()
 
     def map(self, function: Callable[[int, slice], Result], count: int, chunk: int) -> Iterator[Result]:
         """function(chunk number, slice) over `count` items, results in order. Raises Cancelled between chunks."""
@@ -43,4 +46,6 @@ class Workers:
             self.progress.step()
             return done
 
-        return self._pool.map(work, range(-(-count // chunk)))
+        chunks = range(-(-count // chunk))
+        # A single chunk is done sooner here than it is handed over.
+        return self._pool.map(work, chunks) if len(chunks) > 1 else map(work, chunks)

@@ -32,10 +32,10 @@ from .visibility import Visibility
 _DARK, _DIM, GAP = 0.05, 0.5, 0.25
 #: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
 _LIT = 0.25
-
+#: Rays that tell whether hardly any light gets somewhere.
+_GLANCE = 16
 #: Of n rays of which none has met something, up to this over n may: at 95 % (rule of three: Hanley, Lippman-Hand 1983).
 _NONE_OF_N = 3.0
-
 #: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
 #: sides, for what shows of it beside a straight outline has a corner.
 _BESIDES = np.concatenate([0.997 * np.eye(3) + 1e-3, 0.4985 * (1.0 - np.eye(3)) + 1e-3])
@@ -192,6 +192,8 @@ class Survey:
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
         self.rays: Counter[str] = Counter()
+        glance = min(_GLANCE, effort.gather_rays)
+        self._glance = surroundings and surroundings.with_rays(glance, stream(seed, "glance patterns"))
         self._light = direct_light
         self._sky_light = sky_light
         self._effort = effort
@@ -264,7 +266,7 @@ class Survey:
         self._mean = float(total.mean())
 
         def look(some: Points) -> Float64:
-            seen, cast = around.light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
+            seen, cast = (self._glance or around).light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
             self.rays += cast
             return seen
 
@@ -294,7 +296,7 @@ class Survey:
         be.
         """
         chosen = np.flatnonzero(self.invalid & (self.valid_samples == 0))
-        around = self.surroundings
+        around = self._glance
         for k, weights in enumerate(_BESIDES):
             if around is None or not len(chosen):
                 break
