@@ -22,14 +22,17 @@ from .patches import Cells
 from .receivers import Receivers, split_cells
 from .sampling import stream
 from .scene import Bool, Float64
-from .survey import Surroundings, out_of_sight
+from .splitting import until_allowed
+from .survey import GAP, Surroundings, out_of_sight
 from .tessellation import Int64
 
 #: How often a cell is split into four at most.
 LEVELS = 4
-#: How far light may jump inside a cell, relative to the mean and to the error asked for: few cells are crossed, and
-#: what the fit leaves of a jump is a fraction of it.
+#: How far light may jump inside a cell before anyone looks more closely, relative to the mean and to the error asked
+#: for: few cells are crossed, and what the fit leaves of a jump is a fraction of it.
 _BOUNDARY_STEP = 12.0
+#: Share of a jump, squared, that samples of a cell leave uncertain; and of the asked error, squared, that may be left.
+_LEFT_OF_STEP, _SHARE = 1 / 12, 1 / 4
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
 #: lamp with size.
 _POINTS, _RAYS, _SHADOW_RAYS = 4, 8, 4
@@ -81,12 +84,15 @@ class Adaptation:
     def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
         """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
         every = np.arange(len(receivers.cells))
+        area = receivers.cells.area
         first = self._probe(receivers.cells, every, 0, 1, every >= 0)
-        mean, fair = _fair_share(receivers.cells.area, first.direct[0], _BOUNDARY_STEP * error)
-        fresh, hidden = _on_borders(receivers, first, fair), first.hidden[0]
+        mean = float(area @ first.direct[0] / area.sum())
+        allowed = (error * mean) ** 2 * float(area.sum())
+        fresh = _on_borders(receivers, first, _BOUNDARY_STEP**2 * allowed / len(area))
+        hidden, allowed = first.hidden[0], allowed * _SHARE / _LEFT_OF_STEP
         for level in range(LEVELS):
             near = _touching(receivers, hidden)
-            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, fair, limit, near)
+            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, allowed, limit, near)
             if not split.any():
                 break
             # What is hidden beside a contact must not be coarse either: light would reach far into it.
@@ -98,15 +104,15 @@ class Adaptation:
         return receivers
 
     def _worst(
-        self, cells: Cells, fresh: Int64, number: int, mean: float, fair: float, limit: int, near: Bool
+        self, cells: Cells, fresh: Int64, number: int, mean: float, allowed: float, limit: int, near: Bool
     ) -> tuple[Bool, Bool]:
-        """Which cells (c,) to split: of the fresh ones those with the largest squared error, while there is room; and
-        which of them a contact crosses. near (c,): cells where there may be one."""
+        """Which cells (c,) to split: of the fresh ones those with the largest squared jumps, until what is left is
+        allowed or there is no room; and which of them a contact crosses. near (c,): cells where there may be one."""
         split, contact = np.zeros((2, len(cells)), dtype=bool)
         if len(fresh):
             probe = self._probe(cells, fresh, number, _POINTS, near[fresh])
             weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
-            split[fresh[largest(weight, fair, limit - len(cells))]] = True
+            split[fresh[until_allowed(weight, allowed, limit - len(cells))]] = True
             contact[fresh[probe.contact()]] = True
         return split, split & contact
 
@@ -128,6 +134,7 @@ class Adaptation:
                     self._mean = float(direct.mean() + total.mean())
                 # Where the sources shine nothing is hidden.
                 unlit = np.flatnonzero(near & (direct <= 0))
+                unlit = unlit[self._under_something(self._around, Points.of_pass(cells, chosen[unlit], k, shift))]
                 if len(unlit):
                     there = Points.of_pass(cells, chosen[unlit], k, shift)
                     total, enclosed = self._look(self._around, streams, there)
@@ -138,6 +145,14 @@ class Adaptation:
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
+
+    def _under_something(self, around: Surroundings, points: Points) -> Bool:
+        """Which of the points (n,) have the back of something straight above them, or something close: no others can be
+        inside a solid or a gap, and one ray tells what eight would."""
+        where = points.positions, points.normals
+        self.rays["contact"] += 2 * len(points.positions)
+        looks = around.hemispheres
+        return np.asarray(looks.inside(*where) | looks.covered(*where, GAP * points.size))
 
     def _look(self, around: Surroundings, number: int, points: Points) -> tuple[Float64, Bool]:
         """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; and
@@ -151,20 +166,6 @@ class Adaptation:
         seen, rays = around.light_in_sight(points, self._seed, number, self._workers)
         self.rays += rays
         return seen
-
-
-def _fair_share(area: Float64, light: Float64, relative: float) -> tuple[float, float]:
-    """Mean of the light (n,), and the squared error times area that is each cell's share when the root mean square
-    over all may be `relative` to that mean."""
-    mean = float(area @ light / area.sum())
-    return mean, (relative * mean) ** 2 * float(area.sum()) / len(area)
-
-
-def largest(weight: Float64, fair: float, room: int) -> Int64:
-    """The items of largest weight (n,), over a fair share, whose split adds about `room` at most: each becomes four,
-    and makes its neighbours become two or three."""
-    most = min(max(room // 5, 0), int(np.count_nonzero(weight > fair)))
-    return np.argsort(-weight, kind="stable")[:most]
 
 
 def _touching(receivers: Receivers, chosen: Bool) -> Bool:

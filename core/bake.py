@@ -72,14 +72,14 @@ def bake(
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
             planned = price(chosen, settings, calibrate(pilot, settings.threads), fixed=effort is not None)
-            del pilot  # it holds a copy of the scene
             check_cost(planned)
             effort = planned.effort
             clock.progress.expected = planned.seconds
         with clock.stage("tessellate", 0.03):
             start = max(int(effort.triangles / effort.coarsest), 1)
             receivers = make_receivers(scene, space, settings, start)
-            patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers)
+            patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers, pilot)
+            del pilot  # it holds a copy of the scene
             direct_light = DirectLight(lights, visibility, settings.seed)
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)

@@ -21,6 +21,7 @@ from .receivers import Receivers, split_cells
 from .refinement import fit_samples
 from .sampling import stream, subseed
 from .scene import Bool, Scene
+from .splitting import until_allowed
 from .survey import GAP, Surroundings, Survey
 from .tessellation import Int64
 
@@ -73,18 +74,11 @@ class Bends:
         """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
         found = fit_samples(survey, scene, self._workers)
         pieces = found.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
-        squared = np.bincount(source, pieces, len(cells))
+        squared = np.bincount(source, pieces, len(cells)).astype(np.float64)
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
-        # A split cell becomes four, and makes its neighbours become two or three.
-        room = max((limit - len(source)) // 5, 0)
         large = cells.area > _SMALLEST * cells.area.sum() / limit
-        order = np.argsort(np.where(large, -squared, 0.0), kind="stable")
-        positive = np.maximum(squared[order], 0.0)
-        left = positive.sum() - np.cumsum(positive)
-        wanted = int(np.count_nonzero(left > allowed)) + 1 if squared.sum() > allowed else 0
         chosen = np.zeros(len(cells), dtype=bool)
-        chosen[order[: min(wanted, room)]] = True
-        chosen &= squared > 0.0
+        chosen[until_allowed(squared, allowed, limit - len(source))] = True
         chosen[source[self._over_gaps(survey)]] = True
         return np.asarray(chosen & large)
 

@@ -10,14 +10,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from .adaptation import largest
 from .direct.illumination import DirectLight, Source
 from .form_factors.hemisphere import SITES, site_points
 from .parallel import Workers
 from .patches import Patches, PatchMeshes, Space, make_patches, split_objects
+from .pilot import Pilot
 from .plan import Effort
 from .sampling import stream
 from .scene import Bool, Float64, Scene
+from .splitting import over_fair_share
 from .tessellation import Int64, split_triangles
 from .visibility import Visibility
 
@@ -32,12 +33,12 @@ _CHUNK = 1024
 
 
 def patches_by_light(
-    scene: Scene, space: Space, lights: list[Source], effort: Effort, seed: int, workers: Workers
+    scene: Scene, space: Space, lights: list[Source], effort: Effort, seed: int, workers: Workers, pilot: Pilot
 ) -> tuple[Patches, Visibility]:
     """About effort.patches patches, and more where direct light varies; and what is visible among them."""
     split = split_objects(scene, effort.patches)
     patches = make_patches(scene, space, split)
-    visibility = Visibility(patches.corners, patches.optics)
+    visibility = pilot.visibility_for(patches)
     light = DirectLight(lights, visibility, seed)
     triangles = len(patches.area)
     fresh, fair = np.arange(len(patches)), 0.0
@@ -46,7 +47,7 @@ def patches_by_light(
         if level == 0:
             fair = (_VARIATION * float(patches.patch_area @ mean)) ** 2 / float(patches.patch_area.sum()) / len(patches)
         weight = variation**2 * patches.patch_area[fresh]
-        uneven = fresh[largest(weight, fair, _GROWTH * effort.patches - len(patches))]
+        uneven = fresh[over_fair_share(weight, fair, _GROWTH * effort.patches - len(patches))]
         if not len(uneven):
             break
         split, changed = _refined(split, patches, uneven)

@@ -43,6 +43,13 @@ class Pilot:
     def visibility(self) -> Visibility:
         return Visibility(self.patches.corners, self.patches.optics)
 
+    def visibility_for(self, patches: Patches) -> Visibility:
+        """What is visible among some patches: what is ready, where they are of the same triangles."""
+        plain = patches.optics is None and self.patches.optics is None
+        if plain and np.array_equal(patches.corners, self.patches.corners):
+            return self.visibility
+        return Visibility(patches.corners, patches.optics)
+
     def look_around(self, points: Float64, normals: Float64, rays: int, rng: np.random.Generator) -> Look:
         """Cosine-distributed rays from points (n, 3) on surfaces with unit normals (n, 3), n * rays of them."""
         turn = rng.random(len(points), dtype=np.float32) * np.float32(2.0 * np.pi)

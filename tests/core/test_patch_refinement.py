@@ -8,6 +8,7 @@ import pytest
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.patch_refinement import patches_by_light
 from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.pilot import Pilot
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 
 SUN = SunLamp("sun", (0, 0, -1), (1.0, 1.0, 1.0))
@@ -17,7 +18,7 @@ def by_light(build, workers, *objects, lamps=(SUN,), wanted=500):
     scene = Scene(objects, (build.grey,) * 3, lamps)
     space = unit_space(scene)
     lights = [place(lamp, space) for lamp in lamps]
-    return patches_by_light(scene, space, lights, build.effort(patches=wanted), 0, workers)[0]
+    return patches_by_light(scene, space, lights, build.effort(patches=wanted), 0, workers, Pilot(scene))[0]
 
 
 def test_patches_are_finer_along_a_shadow_edge(build, workers):
