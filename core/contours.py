@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from .convexity import nothing_stands_between
-from .direct.illumination import DirectLight
+from .direct.illumination import MOST_CONTOURED, DirectLight
 from .gather import Points, gather_direct
 from .parallel import Workers
 from .receivers import Receivers, cut_cells, numbered_edges, shared_edges
@@ -53,13 +53,11 @@ _SHADOW_RAYS, _RAYS = 8, 16
 _BARRED_UP_TO = 0.98
 #: Points in a chunk; a number of streams that nothing else uses.
 _CHUNK, _STREAM = 8192, 4_000_000
-#: Of more lights than this none breaks enough to be cut along.
-_MOST_LIGHTS = 16
 #: Irrational, so that no sum of places on a grid is another's.
 _MIX = np.sqrt([2.0, 3.0, 5.0])
 #: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
 #: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
-_WHOLE, _BARRED, _COVERED = _MOST_LIGHTS, 1 << 2 * _MOST_LIGHTS, 1 << 2 * _MOST_LIGHTS + 1
+_WHOLE, _BARRED, _COVERED = MOST_CONTOURED, 1 << 2 * MOST_CONTOURED, 1 << 2 * MOST_CONTOURED + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +155,7 @@ class Contours:
         self.rays: Counter[str] = Counter()
         self._light = direct_light
         shading = [light for light in direct_light.lights if light.casts_shadow]
-        self._lights = bool(shading) and len(direct_light.lights) <= _MOST_LIGHTS
+        self._lights = bool(shading) and len(direct_light.lights) <= MOST_CONTOURED
         # A sheet may lie close above another, and still nothing stand between either and a lamp.
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
         self._nothing_to_find = alone or (not self._lights and around is None)

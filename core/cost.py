@@ -21,12 +21,14 @@ from .scene import SceneError
 
 #: Rays, and numbers, that measure how fast this machine is.
 _CALIBRATION = 1 << 13
-#: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers or looks for
-#: a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
-_LOOK, _FORM_FACTOR, _FIT = 24.0, 60.0, 1000.0
+#: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers, of one that
+#: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
+_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 1000.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
-#: are split, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _OWN = 50.0, 900.0, 1500.0, 3300.0, 1300.0
+#: are split, of a cell that contours are looked for in, and of a triangle that is there already.
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 50.0, 900.0, 1500.0, 3300.0, 4000.0, 1300.0
+#: Of any bake, however small.
+_FIXED = 1.5e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
 _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
 
@@ -34,7 +36,8 @@ _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
 @dataclass(frozen=True)
 class Work:
     """What a bake has to do. transport, gather, shadow: rays; cells: the triangles that light is fitted to; own: the
-    triangles that the scene itself has; fits: how often the light is fitted."""
+    triangles that the scene itself has; fits: how often the light is fitted; contours: cells that they are looked for
+    in."""
 
     transport: float = 0.0
     gather: float = 0.0
@@ -43,6 +46,7 @@ class Work:
     patches: float = 0.0
     own: int = 0
     fits: int = 1
+    contours: float = 0.0
 
     @property
     def memory_mb(self) -> float:
@@ -62,9 +66,9 @@ class Machine:
 
     def seconds(self, work: Work) -> float:
         looks, factors = work.gather + work.shadow, work.transport * self.closed
-        shared = looks * _LOOK + factors * _FORM_FACTOR + work.cells * work.fits * _FIT
+        shared = work.gather * _LOOK + work.shadow * _AIM + factors * _FORM_FACTOR + work.cells * work.fits * _FIT
         alone = factors * _BALANCE + work.cells * (work.fits * _ASSEMBLE + _SPLIT_CELL)
-        alone += work.patches * _SPLIT_PATCH + work.own * _OWN
+        alone += work.patches * _SPLIT_PATCH + work.contours * _CONTOUR + work.own * _OWN + bool(work.cells) * _FIXED
         return self.ray * (looks + work.transport) + self.number * (shared / self.threads + alone)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .cost import Machine, Work, calibrate
 from .direct.emitters import emitting_pieces
-from .direct.illumination import MOST_ASKED
+from .direct.illumination import MOST_ASKED, MOST_CONTOURED
 from .direct.sky import split_bright
 from .effects import (
     LAMPS,
@@ -54,8 +54,14 @@ _MORE_PATCHES = 1.6
 #: Openings are looked for where so large a part of the receivers sees little of the sky, and the rays of one point
 #: there tell of it with so much noise, relative to all light.
 _INSIDE, _SHOWS = 0.1, 0.1
-#: What finding where light bends takes for each cell in the end: rays, and fits.
-_BEND_RAYS, _BEND_FITS = 100, 2
+#: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
+#: those scenes.
+_CALLED, _CALLED_POWER = 4_000, 1.75
+#: Finding that takes up to so many rounds, of so many points in each cell with so many rays; a fit in each, of fewer
+#: cells than there are in the end. Contours take so many points for each cell.
+_ROUNDS, _BEND_POINTS, _BEND_RAYS, _BEND_FITS, _CONTOUR_POINTS = 4.0, 4, 16, 2, 12
+#: Share of the cells in which the shadow of one lamp ends; error from which on these need many points.
+_CROSSED, _UNCERTAIN = 0.05, 0.05
 #: Each step of thrift leaves this share of the work.
 _THRIFT, _MOST_THRIFT = 0.8, 24
 
@@ -223,28 +229,42 @@ class _Prices:
         return self._cells[triangles]
 
     def _adapted(self, planned: Plan) -> float:
-        """Cells after adaptation: where they are put where light calls for them, in inverse proportion to the asked
-        error; else those there are, and more along its boundaries."""
+        """Cells after adaptation: where they are put where light calls for them, those it starts from and what the
+        asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            called = _TYPICAL_CELLS * _TYPICAL_RESOLUTION / (0.7 * effort.error)
-            return self._count(max(int(effort.triangles / effort.coarsest), 1)) + min(called, effort.triangles)
+            return self._coarse(effort) + min(_called(effort.error), effort.triangles)
         return planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
+
+    def _coarse(self, effort: Effort) -> int:
+        return self._count(max(int(effort.triangles / effort.coarsest), 1))
+
+    def _surveyed(self, effort: Effort) -> float:
+        """Points that tell where light bends."""
+        if effort.coarsest <= 1.0:
+            return 0.0
+        rounds = min(1.0 + 0.2 / effort.error, _ROUNDS)
+        return rounds * _BEND_POINTS * (self._coarse(effort) + min(_called(effort.error), effort.triangles) / 2.0)
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
         effort, scene = planned.effort, planned.scene
         cells = self._adapted(planned)
         passes = self._passes(effort, cells)
-        looked, trials = (_BEND_RAYS, _BEND_FITS) if effort.coarsest > 1.0 else (0, 0)
+        surveyed = self._surveyed(effort)
         patches = _MORE_PATCHES * effort.patches if planned.looks_around else 0.0
         pieces = self._pieces
         if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
             pieces = _TREE_COST
         suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
         windows = len(scene.portals) if planned.active("portals") else 0
-        asked = min(1.0, MOST_ASKED / max(len(scene.lamps) + pieces + suns + windows, 1))
-        per_light = asked * effort.shadow_rays * (cells * (passes + 1) + 8 * patches)
+        count = len(scene.lamps) + pieces + suns + windows
+        asked = min(1.0, MOST_ASKED / max(count, 1))
+        crossed = (1.0 - (1.0 - _CROSSED) ** count) * min(_UNCERTAIN / effort.error, 1.0) ** 2
+        points = cells * (passes + effort.boundary_passes * crossed)
+        if surveyed and count <= MOST_CONTOURED:
+            points += _CONTOUR_POINTS * cells
+        per_light = asked * effort.shadow_rays * (points + surveyed + 8 * patches)
         lights = {name: sum(isinstance(lamp, kind) for lamp in scene.lamps) for name, kind in LAMPS.items()}
         lights |= {"sky lights": suns, "portals": windows}
         works = {name: Work(shadow=per_light * count) for name, count in lights.items() if count}
@@ -254,13 +274,16 @@ class _Prices:
             # One look serves all that it may meet: it counts for the first of them.
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
             look = Work(
-                2 * patches * effort.transport_rays, cells * (passes * effort.gather_rays + looked), patches=patches
+                transport=2 * patches * effort.transport_rays,
+                gather=cells * passes * effort.gather_rays + surveyed * _BEND_RAYS,
+                patches=patches,
             )
             works[first] = replace(look, shadow=works[first].shadow) if first in works else look
             onward = next((name for name in ONWARD if planned.active(name)), None)
             if onward:
                 works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
-        return {**works, REST: Work(cells=cells, own=self._own, fits=trials + (1 if passes <= effort.passes else 2))}
+        fits = (_BEND_FITS if surveyed else 0) + (1 if passes <= effort.passes else 2)
+        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=cells if surveyed else 0.0)}
 
     def _passes(self, effort: Effort, cells: float) -> float:
         if self._settings.error is None:
@@ -269,6 +292,10 @@ class _Prices:
         rays = effort.gather_rays / _TYPICAL_RAYS
         sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
+
+
+def _called(error: float) -> float:
+    return float(_CALLED * (0.02 / error) ** _CALLED_POWER)
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:

@@ -24,6 +24,8 @@ _CORNERS = np.array([[0.01, 0.99, 0.99, 0.01], [0.01, 0.01, 0.99, 0.99]], dtype=
 #: Of more lights than this, each half of the rays asks so many at a point. Noise falls much faster with this number
 #: than time grows, up to about here: then rays cost more than the closed forms of all lights.
 MOST_ASKED = 24
+#: The shadows of more lights than this are each too faint to be worth a contour.
+MOST_CONTOURED = 16
 
 
 @dataclass(frozen=True, eq=False)
