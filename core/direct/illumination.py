@@ -136,9 +136,9 @@ class DirectLight:
         some, whole = np.zeros((2, len(points)), dtype=np.int64)
         rays = 0
         for number, light in enumerate(self.lights):
-            if not light.casts_shadow:
-                continue
             ask = np.arange(len(points)) if asked is None else np.flatnonzero(asked >> number & 1)
+            if not light.casts_shadow or not len(ask):
+                continue
             rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
             ways = light.aim(along[0][:, ask], np.repeat(rim, len(ask), axis=2))
             gain = light.gain(along[0][:, ask], ways)
