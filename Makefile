@@ -77,7 +77,8 @@ colours: .venv/ready
 	.venv/bin/python -m radiosity_baker.docs.colours
 
 fuzz: .venv/ready
-	.venv/bin/python -m pytest --quiet tests/hard_cases --hypothesis-profile=fuzz --junitxml=build/fuzz.xml -o junit_family=xunit1
+	rm -f build/fuzz.jsonl
+	.venv/bin/python -m pytest --quiet tests/hard_cases --hypothesis-profile=fuzz
 
 reliability: .venv/ready
 	.venv/bin/python docs/reliability.py

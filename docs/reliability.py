@@ -1,11 +1,12 @@
 """Run the hard cases on each Blender that has an environment here, for docs/reliability.md: `make reliability`.
 
-With the argument `tables` only the tables are written anew, of the last run.
+With the argument `tables` only the tables are written anew, of the last run. What the last `make fuzz` has tried so far
+has a column of its own.
 """
 
 from __future__ import annotations
 
-import re
+import json
 import subprocess
 import sys
 from pathlib import Path
@@ -19,9 +20,11 @@ HEADING = """# What was tried to break it
 Written by `make reliability`: the hard cases of [tests/hard_cases](../tests/hard_cases) on each Blender that has an
 environment here (`make test` and `make test-4.5` set them up). Exact values come from closed forms; what a result may
 be off is derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever stands in
-it. Below the cases: what random scenes must keep, and which faults are injected, with how often; `make fuzz` repeats
-them {factor} times as often. `radiosity-baker self-test` prints the closed forms in any Blender.
+it. Below the cases: what random scenes must keep, and which faults are injected, with how often, here and in the last
+long run (`make fuzz`, on one Blender). `radiosity-baker self-test` prints the closed forms in any Blender.
 """
+#: What the long run leaves behind, as tests/hard_cases/conftest.py writes it.
+LONG_RUN = ROOT / "build" / "fuzz.jsonl"
 
 
 def main() -> None:
@@ -72,9 +75,14 @@ def _outcomes(report: Path) -> dict[str, dict[str, str]]:
     return cases
 
 
+def _long_run() -> dict[str, str]:
+    """What the last long run has tried of each test, by its name, and what came of it."""
+    lines = LONG_RUN.read_text(encoding="utf-8").splitlines() if LONG_RUN.exists() else []
+    return {told["name"]: f"{told.get('injected', 1)} {told['verdict']}" for told in map(json.loads, lines)}
+
+
 def _tables(versions: list[str], results: list[dict[str, dict[str, str]]]) -> list[str]:
-    factor = re.search(r"FUZZ_FACTOR = (\d+)", (ROOT / "tests/hard_cases/test_properties.py").read_text())
-    lines = [HEADING.format(factor=factor[1] if factor else "")]
+    lines, long_run = [HEADING], _long_run()
     lines.append("| Case | Exact | Allowed | " + " | ".join(f"Blender {v}" for v in versions) + " |")
     lines.append("|---|---|---|" + "---|" * len(versions))
     others = []
@@ -87,14 +95,15 @@ def _tables(versions: list[str], results: list[dict[str, dict[str, str]]]) -> li
         got = [f"{float(row['got']):.6g} {row['verdict']}" if "got" in row else row["verdict"] for row in rows]
         exact, allowed = float(told["exact"]), float(told["allowed"])
         lines.append(f"| {told['case']} | {exact:.6g} | {allowed:.1e} | {' | '.join(got)} |")
-    lines += ["", "| Property or fault | Injected | " + " | ".join(f"Blender {v}" for v in versions) + " |"]
-    lines.append("|---|---|" + "---|" * len(versions))
+    lines += ["", "| Property or fault | Injected | " + " | ".join(f"Blender {v}" for v in versions) + " | Long run |"]
+    lines.append("|---|---|" + "---|" * len(versions) + "---|")
     for name, rows in others:
         if all(row["verdict"] == "skipped" for row in rows):
             continue
         injected = next((row["injected"] for row in rows if "injected" in row), "1")
         title = name.removeprefix("test_").replace("_", " ").replace("|", "/").replace("\n", " ")
-        lines.append(f"| {title} | {injected} | " + " | ".join(row["verdict"] for row in rows) + " |")
+        verdicts = " | ".join(row["verdict"] for row in rows)
+        lines.append(f"| {title} | {injected} | {verdicts} | {long_run.get(name, '')} |")
     return lines
 
 

@@ -1,11 +1,26 @@
-"""What every case leaves behind for the table in docs/reliability.md: properties in pytest's own XML report."""
+"""What every case leaves behind for the table in docs/reliability.md: properties in pytest's own XML report; and those
+of the long run, which takes hours, in build/fuzz.jsonl as each ends."""
 
 from __future__ import annotations
+
+import json
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 settings.register_profile("fuzz")
+#: A line for each test of `make fuzz`: name, verdict, and what it has told.
+LONG_RUN = Path(__file__).resolve().parents[2] / "build" / "fuzz.jsonl"
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.when == "call" and settings.get_current_profile_name() == "fuzz":
+        LONG_RUN.parent.mkdir(exist_ok=True)
+        verdict = "ok" if report.passed else "FAILED" if report.failed else "skipped"
+        told = {"name": report.nodeid.split("::")[-1], "verdict": verdict, **dict(report.user_properties)}
+        with LONG_RUN.open("a", encoding="utf-8") as lines:
+            lines.write(json.dumps(told, default=str) + "\n")
 
 
 @pytest.fixture
