@@ -206,6 +206,35 @@ def test_collection_instances_come_at_their_places(add_mesh):
     np.testing.assert_allclose(placed["Place 1/Chair"], (1.0, 10.0, 0.0))
 
 
+def test_lamps_in_collection_instances_shine_from_their_places(add_mesh):
+    """Each with its light, its shadows and its warnings; hidden ones do not, nor does the collection itself, which is
+    in no scene."""
+    floor = add_mesh("Floor")
+    source = bpy.data.collections.new("Chandelier")
+    for name in ("Bulb", "Linked", "Hidden", "Unseen"):
+        bulb = bpy.data.objects.new(name, bpy.data.lights.new(name, "POINT"))
+        bulb.data.energy, bulb.data.use_shadow = 10.0, name != "Bulb"
+        bulb.location.z = 2.0
+        source.objects.link(bulb)
+    source.objects["Hidden"].hide_render = True
+    source.objects["Unseen"].visible_diffuse = False
+    source.objects["Linked"].light_linking.receiver_collection = bpy.data.collections.new("Only these")
+    for index in range(2):
+        empty = bpy.data.objects.new(f"Hook {index}", None)
+        empty.instance_type, empty.instance_collection = "COLLECTION", source
+        empty.location.x = 3.0 * index
+        bpy.context.scene.collection.objects.link(empty)
+
+    scene, _ = read(floor)
+
+    lamps = {lamp.name: lamp for lamp in scene.lamps}
+    assert set(lamps) == {"Lamp", "Hook 0/Bulb", "Hook 1/Bulb", "Hook 0/Linked", "Hook 1/Linked"}
+    assert lamps["Hook 1/Bulb"].position == pytest.approx((3.0, 0.0, 2.0))
+    assert lamps["Hook 1/Bulb"].intensity == pytest.approx(lamps["Lamp"].intensity)
+    assert [lamps[name].casts_shadow for name in ("Hook 1/Bulb", "Hook 1/Linked")] == [False, True]
+    assert sum("Light linking" in warning and "Linked'" in warning for warning in scene.warnings) == 2
+
+
 def test_instances_on_vertices_follow_the_instancers_render_switch(add_mesh):
     floor = add_mesh("Floor", location=(0, 0, -5))
     parent, child = add_mesh("Parent"), add_mesh("Child")

@@ -424,3 +424,34 @@ def test_no_two_triangles_share_a_pixel_and_linear_values_stay_linear(cuts):
     for point in (*even_points(25), *np.eye(3), (0, 0.5, 0.5), (0.5, 0.5, 0)):
         found = look_up(texture, np.einsum("k,tkc->tc", point, lattice.uv).astype(float))[:, 0]
         np.testing.assert_allclose(found, point[1] * np.arange(1, len(cuts) + 1) + point[2] * 3, atol=2e-3)
+
+
+def packed_image(folder):
+    """One whose file is gone."""
+    saved = make_image(RANDOM.random((4, 6, 3)))
+    saved.filepath_raw, saved.file_format = str(folder / "picture.png"), "PNG"
+    saved.save()
+    packed = bpy.data.images.load(saved.filepath_raw)
+    packed.pack()
+    (folder / "picture.png").unlink()
+    return packed
+
+
+def generated_image(_):
+    """A test card that Blender draws by itself."""
+    generated = bpy.data.images.new("Grid", 64, 64)
+    generated.source, generated.generated_type = "GENERATED", "COLOR_GRID"
+    return generated
+
+
+@pytest.mark.parametrize("image", [packed_image, generated_image])
+def test_images_without_a_file_are_what_cycles_has(pictured, scattered, tmp_path, image):
+    obj = scattered(pictured(image(tmp_path), interpolation="Closest"))
+
+    scene = read(obj)
+
+    assert not scene.warnings
+    off = np.abs(albedo_at_corners(scene) - albedo_by_cycles(obj)).max(axis=2)
+    # On the border of two pixels either may be meant.
+    assert np.quantile(off, 0.95) < 0.012
+    assert np.ptp(albedo_at_corners(scene)) > 0.5

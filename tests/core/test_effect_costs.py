@@ -12,13 +12,14 @@ from radiosity_baker.core import plan as planning
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.comparison import radiance_at, scatter
 from radiosity_baker.core.direct import emitters as direct_emitters
+from radiosity_baker.core.direct import illumination, lamps
 from radiosity_baker.core.direct import sky as direct_sky
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.gather import Points
 from radiosity_baker.core.patches import Patches
 from radiosity_baker.core.sampling import stream
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, Surface, Texture
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, SpotLamp, SunLamp, Surface, Texture
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.visibility import Visibility
 
@@ -38,8 +39,18 @@ def scene(build, veil=None, **changes) -> Scene:
     return replace(Scene((floor, sheet), (build.grey, veil or build.grey), (LAMP,)), **changes)
 
 
+SPOT = SpotLamp("torch", (0, 0, 1), (1.0, 1.0, 1.0), ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0)), 1.0, 0.1)
+SUN = SunLamp("noon", (0.1, 0, -1), (1.0, 1.0, 1.0))
+AREA = AreaLamp("softbox", (0, 0, 1), (0.1, 0, 0), (0, 0.1, 0), (0, 0, -1), (1.0, 1.0, 1.0))
+BRIGHT = SkyMap(np.where(np.arange(128).reshape(8, 16, 1) == 100, 500.0, UNEVEN.pixels).astype(np.float32))
+
 #: By effect: what only works for it, and a scene that has the effect.
 WORK = {
+    "spot lamps": ((lamps, "Spot"), lambda build: scene(build, lamps=(SPOT,))),
+    "sun": ((lamps, "Sun"), lambda build: scene(build, lamps=(SUN,))),
+    "area lamps": ((lamps.Panel, "from_area_lamp"), lambda build: scene(build, lamps=(AREA,))),
+    "many lamps": ((illumination, "Crowd"), lambda build: scene(build, lamps=(LAMP,) * 30)),
+    "sky lights": ((direct_sky, "place"), lambda build: scene(build, sky=BRIGHT)),
     "sky": ((planning, "look_for_sky"), lambda build: scene(build, sky=TENTH)),
     "sky map": ((effects, "split_bright"), lambda build: scene(build, sky=UNEVEN)),
     "portals": ((direct_sky, "Window"), lambda build: scene(build, sky=TENTH, portals=(PORTAL,))),
