@@ -21,6 +21,7 @@ from mathutils import Matrix
 from ..core.patches import triangle_geometry
 from ..core.result import BakedObject
 from ..core.scene import Float32, Float64, Int32, Texture
+from .cycles_studio import TARGET, bake_corners, cycles_studio, posed
 from .receiver_source import ReceiverSource
 from .slices import at_once
 from .tessellated_mesh import MeshData, build_mesh
@@ -31,7 +32,6 @@ _PARTS, _FEWEST, _FINEST = 60_000, 1_000, 96
 _INWARD = 0.25
 #: Pixels across the texture.
 _WIDTH = 1024
-_ATTRIBUTE = "Radiosity Sample"
 #: Nodes whose values depend on the object or its place in the world, and on which outputs.
 _BY_OBJECT = {
     "ShaderNodeAttribute": None,
@@ -113,7 +113,7 @@ class MaterialSamples:
             shown = attributes.render_color_index
             self._requests.append(
                 _Request(
-                    MeshData.read(mesh, (), {_ATTRIBUTE}),
+                    MeshData.read(mesh, (), {TARGET}),
                     *_triangles(mesh),
                     (np.array(mesh.texspace_location), np.array(mesh.texspace_size)),
                     attributes[shown].name if 0 <= shown < len(attributes) else "",
@@ -131,7 +131,8 @@ class MaterialSamples:
             return []
         areas = [float(triangle_geometry(request.triangles)[1].sum()) for request in self._requests]
         shares = [_PARTS * area / max(sum(areas), 1e-30) for area in areas]
-        with _studio(self._frame) as studio:
+        with cycles_studio() as studio:
+            studio.frame_current = self._frame
             requests = zip(self._requests, shares, strict=True)
             return [_sample(studio, request, max(share, _FEWEST)) for request, share in requests]
 
@@ -147,33 +148,16 @@ def depends_on_object(tree: bpy.types.NodeTree | None) -> bool:
     return False
 
 
-@contextmanager
-def _studio(frame: int) -> Iterator[bpy.types.Scene]:
-    """A scene for Cycles to bake in."""
-    studio = bpy.data.scenes.new(_ATTRIBUTE)
-    try:
-        try:
-            studio.render.engine = "CYCLES"
-        except TypeError as problem:
-            raise RuntimeError("the add-on Cycles Render Engine is disabled") from problem
-        studio.frame_current = frame
-        studio.cycles.samples, studio.cycles.device = 1, "CPU"
-        studio.cycles.use_denoising = studio.cycles.use_adaptive_sampling = False
-        yield studio
-    finally:
-        bpy.data.scenes.remove(studio)
-
-
 def _sample(studio: bpy.types.Scene, request: _Request, parts: float) -> Sampled:
     lattice = Lattice(_cuts(request.triangles, parts))
     with _finely_cut(studio, request, lattice) as obj:
         with _altered(obj, request.materials, _leave_diffuse_part):
-            albedo = _bake(studio, obj, "DIFFUSE", {"COLOR"})
-            emission = _bake(studio, obj, "EMIT", set())
+            albedo = bake_corners(studio, obj, "DIFFUSE", "COLOR")
+            emission = bake_corners(studio, obj, "EMIT")
         opacity = None
         if any(material and _lets_through(material.node_tree) for material in request.materials):
             with _altered(obj, request.materials, _glow_where_open):
-                covers = np.maximum(1.0 - _bake(studio, obj, "EMIT", set()), 0.0)
+                covers = np.maximum(1.0 - bake_corners(studio, obj, "EMIT"), 0.0)
             opacity, mixed = np.repeat(covers[:, :1], 3, axis=1), covers[:, 1:2]
             # A mix with a transparent shader dims the others; what is there has their whole colour.
             albedo, emission = (v / np.where(mixed > _FAINTEST, mixed, 1.0) for v in (albedo, emission))
@@ -185,17 +169,6 @@ def _sample(studio: bpy.types.Scene, request: _Request, parts: float) -> Sampled
     )
 
 
-def _bake(studio: bpy.types.Scene, obj: bpy.types.Object, kind: str, passes: set[str]) -> Float32:
-    """(corners, 3) of one of Blender's bakes."""
-    chosen = {"active_object": obj, "object": obj, "selected_objects": [obj], "selected_editable_objects": [obj]}
-    with bpy.context.temp_override(scene=studio, view_layer=studio.view_layers[0], **chosen):
-        bpy.ops.object.bake(type=kind, pass_filter=passes, target="VERTEX_COLORS", use_selected_to_active=False)
-    data = obj.data.color_attributes[_ATTRIBUTE].data
-    values = np.empty(len(data) * 4, np.float32)
-    data.foreach_get("color", values)
-    return np.maximum(np.nan_to_num(values.reshape(-1, 4)[:, :3]), 0.0)
-
-
 @contextmanager
 def _finely_cut(studio: bpy.types.Scene, request: _Request, lattice: Lattice) -> Iterator[bpy.types.Object]:
     """The mesh in its place in the studio, cut up, with all its attributes, ready to be baked to."""
@@ -205,26 +178,16 @@ def _finely_cut(studio: bpy.types.Scene, request: _Request, lattice: Lattice) ->
     nowhere = np.zeros((count + triangles.size, 3))
     parts = BakedObject("", nowhere, triangles, lattice.parent, lattice.barycentric, layers={})
     mesh = at_once(build_mesh(request.mesh, source, parts))
-    obj = bpy.data.objects.new(_ATTRIBUTE, mesh)
-    try:
-        if not mesh.materials:
-            mesh.materials.append(None)
-        mesh.use_auto_texspace = False
-        mesh.texspace_location, mesh.texspace_size = request.texture_space
-        if request.render_color:
-            mesh.color_attributes.render_color_index = mesh.color_attributes.find(request.render_color)
-        target = mesh.color_attributes.new(_ATTRIBUTE, "FLOAT_COLOR", "CORNER")
-        mesh.color_attributes.active_color_name = target.name
-        obj.matrix_world, obj.color, obj.pass_index = request.matrix, request.color, request.pass_index
-        studio.collection.objects.link(obj)
-        layer = studio.view_layers[0]
-        layer.update()
-        layer.objects.active = obj
-        obj.select_set(True, view_layer=layer)
+    obj = bpy.data.objects.new(TARGET, mesh)
+    obj.matrix_world, obj.color, obj.pass_index = request.matrix, request.color, request.pass_index
+    if not mesh.materials:
+        mesh.materials.append(None)
+    mesh.use_auto_texspace = False
+    mesh.texspace_location, mesh.texspace_size = request.texture_space
+    if request.render_color:
+        mesh.color_attributes.render_color_index = mesh.color_attributes.find(request.render_color)
+    with posed(studio, obj):
         yield obj
-    finally:
-        bpy.data.objects.remove(obj)
-        bpy.data.meshes.remove(mesh)
 
 
 @contextmanager

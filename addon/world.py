@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Self
 
 import bpy
 import numpy as np
 
 from ..core.scene import RGB, Bool, Float32, Float64, SkyMap, SunLamp
 from .compat import shader_tree
+from .cycles_studio import bake_corners, cycles_studio, posed
 from .materials import read_constant_background
 
 #: Rows of the map: of a tree without pictures, and at most. Every bright pixel and its neighbours are looked at again
@@ -55,10 +55,10 @@ def read_world(world: bpy.types.World | None) -> WorldLight:
     if not unread:
         return WorldLight(colour, warnings=warnings)
     try:
-        with _Observatory(world) as observatory:
+        with _observatory(world) as observatory:
             sky, suns = _look(observatory)
             return WorldLight(sky, suns, warnings)
-    except (RuntimeError, TypeError) as problem:
+    except RuntimeError as problem:
         # Cycles is switched off, or busy with a render.
         remedy = f"could not be evaluated by Cycles ({str(problem).strip()}): switch the add-on Cycles on"
         warnings.append(f"World '{world.name}' {remedy}. A plain colour is used.")
@@ -114,47 +114,42 @@ def _direction(row: Float64, column: Float64, height: int) -> Float32:
     return np.stack([x, y, np.cos(polar)], axis=-1).astype(np.float32)
 
 
+@contextmanager
+def _observatory(world: bpy.types.World) -> Iterator[_Observatory]:
+    """A scene with nothing but a copy of a world, in which Cycles tells its radiance."""
+    with cycles_studio() as studio:
+        observatory = _Observatory(studio, world.copy(), f"World '{world.name}'")
+        try:
+            observatory.prepare()
+            yield observatory
+        finally:
+            bpy.data.batch_remove(observatory.made)
+
+
 class _Observatory:
-    """A scene with nothing but a copy of a world, in which Cycles tells its radiance. Used as a context manager.
+    """name: what messages call the world; height: rows of a map that shows what its pictures do; suns: Sky Textures
+    that show a disc; made: all that is to be removed in the end."""
 
-    height: rows of a map that shows what the world's pictures do; suns: Sky Textures that show a disc.
-    """
-
-    def __init__(self, world: bpy.types.World) -> None:
-        self._original = world
-        self.name = f"World '{world.name}'"
+    def __init__(self, studio: bpy.types.Scene, world: bpy.types.World, name: str) -> None:
+        self.name = name
         self.height = _HEIGHT
         self.has_pictures = False
         self.suns: list[bpy.types.Node] = []
+        self.made: list[bpy.types.ID] = [world]
+        self._studio = studio
+        self._world = world
 
-    def __enter__(self) -> Self:
-        self._scene = bpy.data.scenes.new("Radiosity sky")
-        self._world = self._original.copy()
-        self._groups: list[bpy.types.NodeTree] = []
-        try:
-            self._prepare(self._world.node_tree)
-            for kind in ("camera", "diffuse", "glossy", "transmission", "scatter"):
-                setattr(self._world.cycles_visibility, kind, True)
-            # Cycles would draw up a map of where its light comes from, which nothing here asks for.
-            self._world.cycles.sampling_method = "NONE"
-            self._scene.world = self._world
-            self._scene.render.engine = "CYCLES"
-            cycles = self._scene.cycles
-            cycles.device, cycles.samples = "CPU", 1
-            cycles.use_denoising = cycles.use_adaptive_sampling = False
-        except BaseException:
-            self.__exit__()
-            raise
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        bpy.data.scenes.remove(self._scene)
-        bpy.data.worlds.remove(self._world)
-        for group in self._groups:
-            bpy.data.node_groups.remove(group)
+    def prepare(self) -> None:
+        """Make the copy show what a diffuse ray sees, whatever ray it is."""
+        self._prepare(self._world.node_tree)
+        for kind in ("camera", "diffuse", "glossy", "transmission", "scatter"):
+            setattr(self._world.cycles_visibility, kind, True)
+        # Cycles would draw up a map of where its light comes from, which nothing here asks for.
+        self._world.cycles.sampling_method = "NONE"
+        self._studio.world = self._world
 
     def _prepare(self, tree: bpy.types.NodeTree) -> None:
-        """Make the copy show what a diffuse ray sees, in the groups that it uses as well."""
+        """Make a node tree show what a diffuse ray sees, and the groups that it uses as well."""
         for node in list(tree.nodes):
             if node.bl_idname == "ShaderNodeLightPath":
                 _tell_of_diffuse_rays(tree, node)
@@ -165,48 +160,27 @@ class _Observatory:
                 self.has_pictures = True
             elif node.bl_idname == "ShaderNodeGroup" and node.node_tree is not None:
                 node.node_tree = node.node_tree.copy()
-                self._groups.append(node.node_tree)
+                self.made.append(node.node_tree)
                 self._prepare(node.node_tree)
 
     def radiance(self, directions: Float32) -> Float32:
         """(n, 3) of the world in directions (n, 3)."""
-        with self._points(directions) as obj:
-            layer = self._scene.view_layers[0]
-            override = {"scene": self._scene, "view_layer": layer, "active_object": obj, "object": obj}
-            selected = {"selected_objects": [obj], "selected_editable_objects": [obj]}
-            with bpy.context.temp_override(**override, **selected):
-                bpy.ops.object.bake(type="ENVIRONMENT", target="VERTEX_COLORS")
-            data = obj.data.color_attributes[0].data
-            values = np.empty(len(data) * 4, np.float32)
-            data.foreach_get("color", values)
-        baked = values.reshape(-1, 4)[: len(directions), :3]
-        return np.maximum(np.nan_to_num(baked, nan=0.0, posinf=0.0), 0.0)
+        with posed(self._studio, _points(directions)) as obj:
+            return bake_corners(self._studio, obj, "ENVIRONMENT")[: len(directions)]
 
-    @contextmanager
-    def _points(self, directions: Float32) -> Iterator[bpy.types.Object]:
-        """An object with a vertex in each direction; the triangles between them are without meaning."""
-        count = -(-len(directions) // 3)
-        places = np.resize(directions, (3 * count, 3))
-        mesh = bpy.data.meshes.new("Directions")
-        obj = bpy.data.objects.new("Directions", mesh)
-        try:
-            mesh.vertices.add(3 * count)
-            mesh.vertices.foreach_set("co", places.ravel())
-            mesh.loops.add(3 * count)
-            mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
-            mesh.polygons.add(count)
-            mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
-            mesh.update(calc_edges=True)
-            mesh.color_attributes.new("Radiance", "FLOAT_COLOR", "CORNER")
-            mesh.color_attributes.active_color_index = 0
-            self._scene.collection.objects.link(obj)
-            layer = self._scene.view_layers[0]
-            layer.objects.active = obj
-            obj.select_set(True, view_layer=layer)
-            yield obj
-        finally:
-            bpy.data.objects.remove(obj)
-            bpy.data.meshes.remove(mesh)
+
+def _points(directions: Float32) -> bpy.types.Object:
+    """An object with a vertex in each direction; the triangles between them are without meaning."""
+    count = -(-len(directions) // 3)
+    mesh = bpy.data.meshes.new("Directions")
+    mesh.vertices.add(3 * count)
+    mesh.vertices.foreach_set("co", np.resize(directions, (3 * count, 3)).ravel())
+    mesh.loops.add(3 * count)
+    mesh.loops.foreach_set("vertex_index", np.arange(3 * count, dtype=np.int32))
+    mesh.polygons.add(count)
+    mesh.polygons.foreach_set("loop_start", np.arange(0, 3 * count, 3, dtype=np.int32))
+    mesh.update(calc_edges=True)
+    return bpy.data.objects.new("Directions", mesh)
 
 
 def _tell_of_diffuse_rays(tree: bpy.types.NodeTree, node: bpy.types.Node) -> None:

@@ -405,7 +405,7 @@ def test_when_cycles_fails_plain_values_stay_and_nothing_is_left_behind(add_mate
     obj.data.materials.append(noisy(add_material("ShaderNodeBsdfPrincipled", Base_Color=(0.3, 0.2, 0.1, 1.0))))
     bpy.context.view_layer.update()
     before = counts()
-    monkeypatch.setattr(material_samples, "_bake", refuse)
+    monkeypatch.setattr(material_samples, "bake_corners", refuse)
 
     scene = read(obj)
 
