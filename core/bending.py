@@ -20,7 +20,7 @@ from .plan import Effort
 from .receivers import Receivers, split_cells
 from .refinement import fit_samples
 from .sampling import stream, subseed
-from .scene import Bool, Scene
+from .scene import Bool, Float64, Scene
 from .splitting import until_allowed
 from .survey import GAP, Surroundings, Survey
 from .tessellation import Int64
@@ -29,6 +29,8 @@ from .tessellation import Int64
 _ROUNDS, _PASSES, _RAYS = 4, 4, 16
 #: Share of the asked error that may be left to the triangles.
 _SHARE = 0.7
+#: How often errors that are mostly noise are averaged with those around them.
+_BLURS = 2
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
 
@@ -73,7 +75,9 @@ class Bends:
     def _worst(self, scene: Scene, survey: Survey, cells: Cells, source: Int64, limit: int) -> Bool:
         """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
         found = fit_samples(survey, scene, self._workers)
-        pieces = found.area * found.shown * np.sum([fitted.resolution for fitted in found.fits], axis=0)
+        direct, *indirect = (fitted.resolution for fitted in found.fits)
+        # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
+        pieces = found.area * found.shown * sum((_blurred(error, survey.receivers) for error in indirect), direct)
         squared = np.bincount(source, pieces, len(cells)).astype(np.float64)
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         large = cells.area > _SMALLEST * cells.area.sum() / limit
@@ -95,3 +99,10 @@ class Bends:
         bounds, closed = (looks.covered(*where, reach * points.size) for reach in (GAP, GAP / 2**_ROUNDS))
         self.rays["contact"] += 3 * len(hidden)
         return hidden[bounds & ~closed & ~looks.inside(*where)]
+
+
+def _blurred(error: Float64, receivers: Receivers) -> Float64:
+    """Errors (c,) averaged with those of the cells around."""
+    for _ in range(_BLURS):
+        error = receivers.at_cells(receivers.vertex_means(error))
+    return error

@@ -84,6 +84,10 @@ class Receivers:
         around = np.bincount(corner, weight, self.vertices)
         return np.asarray(total / np.maximum(around, np.finfo(float).tiny))
 
+    def at_cells(self, values: Float64) -> Float64:
+        """Means (c,) of values (v,) at the fit vertices around each cell."""
+        return np.asarray(values[self.corner_vertex[self.cells.element]].mean(axis=1))
+
     @cached_property
     def cell_vertex(self) -> Int32:
         """(c, 3) the mesh vertex of each corner of the cells, counted over all receivers."""
