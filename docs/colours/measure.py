@@ -39,7 +39,7 @@ class Scale:
     of bakes on even meshes, and of the best fit; samples of Cycles; how many times as many triangles the finer mesh
     has."""
 
-    points: int = 4_000
+    points: int = 2_000
     paths: int = 256
     triangles: int = 12_000
     error: float = 0.02
