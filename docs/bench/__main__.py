@@ -135,7 +135,7 @@ def report(results: dict[str, Any]) -> str:
         text += "\n### Every bake\n\n" + _table(*_runs(results["scenes"], threads))
         text += "\n" + _honesty(results["scenes"])
     if results["growth"]:
-        text += "\n### Growth\n\n" + _table(*_growth(results["growth"])) + "\n" + _exponent(results["growth"])
+        text += "\n### Growth\n\n" + _table(*_growth(results["growth"], threads)) + "\n" + _exponent(results["growth"])
     if results["original"]:
         text += "\n### The original scheme\n\n" + _table(*_original(results["original"]))
     return text
@@ -195,11 +195,21 @@ def _honesty(scenes: dict[str, Beside]) -> str:
     )
 
 
-def _growth(runs: Sequence[Run]) -> tuple[list[str], list[list[str]]]:
-    head = ["triangles", "seconds", "predicted s", "stated error", "peak MB", "predicted MB", "Mrays"]
+def _growth(runs: Sequence[Run], threads: int) -> tuple[list[str], list[list[str]]]:
+    head = [
+        "triangles",
+        "seconds",
+        "predicted s",
+        "of Embree alone",
+        "stated error",
+        "peak MB",
+        "predicted MB",
+        "Mrays",
+    ]
     return head, [
-        [f"{run.triangles:,}", f"{run.seconds:.2f}", f"{run.predicted:.2f}", f"{run.stated:.2%}",
-         f"{run.peak_mb:,.0f}", f"{run.predicted_mb:,.0f}", f"{run.rays['total'] / 1e6:.1f}"]
+        [f"{run.triangles:,}", f"{run.seconds:.2f}", f"{run.predicted:.2f}",
+         f"{run.seconds * threads / run.embree:.1f} x", f"{run.stated:.2%}", f"{run.peak_mb:,.0f}",
+         f"{run.predicted_mb:,.0f}", f"{run.rays['total'] / 1e6:.1f}"]
         for run in runs
     ]  # fmt: skip
 
