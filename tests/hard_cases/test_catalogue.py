@@ -198,6 +198,16 @@ def test_furnace_with_300_crumbs(told):
     check("furnace: 300 crumbs", furnace(crowd(300)), told, catches="sides that no ray has met taken for black")
 
 
+def test_furnace_with_thousands_of_specks(told, long_run):
+    """Ten thousand in the long run. The mean: backs of specks that no ray of the transport has met are black to the few
+    rays that meet them later."""
+    count = 10_000 if long_run else 1_000
+    speck = 2e-3 * np.array(CORNERS)
+    places = np.random.default_rng(0).uniform(-0.5, 0.5, (count, 3))
+    specks = [triangles(f"speck {k}", speck + place, [[0, 1, 2]]) for k, place in enumerate(places)]
+    check(f"furnace: {count:,} specks", replace(furnace(specks), mean=True), told, catches="cost by object")
+
+
 @pytest.mark.parametrize("place", PLACES)
 def test_furnace_anywhere(place, told):
     bodies, _ = FURNISHED["box standing on a box"]
@@ -320,6 +330,15 @@ def ball_of_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     return np.tile(np.float32([0.1, 0.05, -0.02]), (count, 1)), ways
 
 
+def around(width: float, depth: float) -> list[SceneObject]:
+    """A roof over the floor and beyond, but for a hole of that size over the floor's middle."""
+    x, y = 0.5 + width / 2, 0.5 + depth / 2
+    sides = [(-1, -1, 2, 1 - y), (-1, y, 2, 2), (-1, 1 - y, 1 - x, y), (x, 1 - y, 2, y)]
+    return [
+        quad(f"roof {k}", (a, b, 0.3), (0, d - b, 0), (c - a, 0, 0)) for k, (a, b, c, d) in enumerate(sides) if d > b
+    ]
+
+
 SHADED: dict[str, tuple[Callable[[], KnownLight], str]] = {
     "blocker smaller than a patch": (
         lambda: shaded(1 - 0.03**2, quad("dot", (0.31, 0.42, 0.5), (0.03, 0, 0), (0, 0.03, 0))),
@@ -336,6 +355,8 @@ SHADED: dict[str, tuple[Callable[[], KnownLight], str]] = {
         lambda: shaded(0.0, sun=SunLamp("sun", (1.0, 0.0, 0.0), (np.pi,) * 3)),
         "light from the horizon",
     ),
+    "pinhole": (lambda: shaded(0.05**2, *around(0.05, 0.05)), "a spot of sun that no sample has found"),
+    "crack of a door": (lambda: shaded(0.01, *around(0.01, 1.0)), "light narrower than a triangle"),
     "floor in full shade": (lambda: shaded(0.0, quad("roof", (-5, -5, 0.1), (11, 0, 0), (0, 11, 0))), "leaks"),
 }
 

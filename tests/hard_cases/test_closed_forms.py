@@ -12,6 +12,7 @@ import pytest
 
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.closed_forms import FormFactor, form_factors, known_light, parallel, wedge
+from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 from radiosity_baker.core.scene import PointLamp, Scene, Surface
 from radiosity_baker.core.self_test import check_form_factor, check_light, corners_of, estimate_form_factor
 from radiosity_baker.core.settings import Settings
@@ -44,6 +45,24 @@ def test_light(case, estimator, tessellate, told):
         pytest.skip("two triangles cannot show how a lamp's light falls off")
     outcome = check_light(known, estimator, tessellate=tessellate)
     told(outcome.case, outcome.exact, outcome.got, outcome.allowed)
+
+
+#: Lambert's formula: the corner of a unit square in its plane and its sides u, v, as seen from the origin, upward.
+ELEMENTS = {
+    "parallel rectangle 1 x 1, at distance 1": ((0, 0, 1), (1, 0, 0), (0, 1, 0), 0.138531606),
+    "parallel rectangle 1 x 1, at distance 0.1": ((0, 0, 0.1), (1, 0, 0), (0, 1, 0), 0.247971408),
+    "perpendicular rectangle 1 x 1, at distance 1": ((0, 1, 0), (1, 0, 0), (0, 0, 1), 0.055734197),
+    "perpendicular rectangle 1 x 1, at distance 0.1": ((0, 0.1, 0), (1, 0, 0), (0, 0, 1), 0.221738671),
+}
+
+
+@pytest.mark.parametrize("case", ELEMENTS)
+def test_form_factor_of_an_element(case, told):
+    """To the digits of the catalogue. Seen to fail: a polygon that is not cut at the horizon."""
+    corner, u, v, exact = ELEMENTS[case]
+    outline = np.array([corner, np.add(corner, u), np.add(np.add(corner, u), v), np.add(corner, v)], dtype=float)
+    got = float(polygon_irradiance((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), outline, two_sided=True))
+    told(f"element to {case}", exact, got, 1e-9)
 
 
 @pytest.mark.parametrize("degrees", [0.1, 1.0])
