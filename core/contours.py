@@ -178,7 +178,7 @@ class Contours:
             number, _ = numbered_edges(receivers.cell_vertex)
             edges = _Edges.of(receivers, number)
             found = self._follow(receivers, edges, number, near)
-            margin = _SNAP * size[source[edges.cell]] / edges.length
+            margin = _SNAP * size[source[edges.cell]] / np.maximum(edges.length, np.finfo(float).tiny)
             place = _off_the_ends(found.place + _WITHIN * margin * found.inward, found.inward, margin)
             contoured |= np.isfinite(found.place)[number].any(axis=1)
             receivers, piece = cut_cells(receivers, place[number])

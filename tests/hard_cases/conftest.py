@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 settings.register_profile("fuzz")
-#: A line for each test of `make fuzz`: name, verdict, and what it has told.
+#: A line for each test of `make fuzz`: name, verdict, what it has told, and what was wrong.
 LONG_RUN = Path(__file__).resolve().parents[2] / "build" / "fuzz.jsonl"
 
 
@@ -19,6 +19,8 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
         LONG_RUN.parent.mkdir(exist_ok=True)
         verdict = "ok" if report.passed else "FAILED" if report.failed else "skipped"
         told = {"name": report.nodeid.split("::")[-1], "verdict": verdict, **dict(report.user_properties)}
+        if report.failed:
+            told["problem"] = report.longreprtext
         with LONG_RUN.open("a", encoding="utf-8") as lines:
             lines.write(json.dumps(told, default=str) + "\n")
 

@@ -324,6 +324,16 @@ def shaded(share: float, *blockers: SceneObject, sun: SunLamp = DOWN) -> KnownLi
     )
 
 
+def test_edges_without_length_are_not_cut():
+    """A face that names a vertex twice, beside faces that a solid covers in part (found by the fuzzer: 0 / 0)."""
+    faces = [[0, 1, 2], [0, 1, 3], [1, 1, 2], [2, 1, 0]]
+    broken = triangles("broken", [(0, 0, 0), (1, 0, 0), (0, 1, 0), (2, 0, 0)], faces)
+    scene = Scene((box("box", (0, 0, 0), (0.25, 0.25, 0.25)), broken), (WHITE,), sky=(1.0, 2.0, 3.0))
+    light = corners_of(bake(scene, Settings(triangles=30, error=0.3)))[1]
+    assert np.isfinite(light).all()
+    assert light.min() >= 0
+
+
 def ball_of_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     ways = rng.normal(size=(count, 3)).astype(np.float32)
