@@ -7,7 +7,7 @@ import pytest
 
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.patch_refinement import patches_by_light
-from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.patches import make_patches, split_objects, unit_space
 from radiosity_baker.core.pilot import Pilot
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 
@@ -73,3 +73,12 @@ def test_groups_are_finer_where_a_lamp_is_near(build, workers):
     np.maximum.at(height, patches.patch, patches.corners[..., 2].mean(axis=1))
     assert len(patches) > len(even)
     assert np.median(patches.patch_area[height > 0.9]) < 0.5 * np.median(patches.patch_area[height < 0])
+
+
+@pytest.mark.parametrize(("wanted", "same"), [(2048, True), (8000, False)])
+def test_embree_serves_the_bake_where_its_triangles_are_those_of_the_pilot(build, wanted, same):
+    """A floor that is split as far as the pilot splits it, and farther."""
+    scene = Scene((build.quad(),), (build.grey,) * 3, (SUN,))
+    pilot = Pilot(scene)
+    patches = make_patches(scene, unit_space(scene), split_objects(scene, wanted))
+    assert (pilot.visibility_for(patches) is pilot.visibility) == (len(patches.area) == len(pilot.patches.area)) == same
