@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..scene import Float64
 from .choice import chances, draw
-from .lamps import Ball, Light, Spot
+from .lamps import Ball, Light, Panel
 
 #: Numbers of one array, and lights asked at once: what a processor's cache holds.
 _TABLE, _ASKED = 1 << 14, 1 << 13
@@ -94,9 +94,7 @@ class Crowd:
 
 def _kind(light: Light, number: int) -> object:
     """What lights have in common that can be asked together; others stand alone."""
-    if not isinstance(light, Ball):
-        return number
-    return isinstance(light, Spot), light.sized, light.casts_shadow, light.facing_disc
+    return (type(light), light.kind) if isinstance(light, Ball) or type(light) is Panel else number
 
 
 def _together(lights: Sequence[Light]) -> Light:
@@ -116,7 +114,8 @@ def _chosen(light: Light, chosen: Any) -> Light:
 
 
 def _each(light: Light) -> tuple[str, ...]:
-    return light.each if isinstance(light, Ball) else ()
+    """What there is one of for each of the lights, if there are several."""
+    return light.each if isinstance(light, Ball) or type(light) is Panel else ()
 
 
 def _joined(parts: Sequence[Asked]) -> Asked:

@@ -11,6 +11,7 @@ components and samples first, (3, r, n), in single precision: numpy then runs al
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import dataclass
 from typing import Any, Protocol, TypeVar
 
@@ -75,6 +76,11 @@ def place(lamp: Lamp, space: Space) -> Light:
             return Ball(lamp, space)
 
 
+def _column(vectors: Float64) -> Float64:
+    """A vector (3,) as (3, 1), to broadcast over points; or one vector for each point (n, 3) as (3, n)."""
+    return np.atleast_2d(vectors).T
+
+
 def _spread(towards: Float32, depth: Float32, scale: Float32 | float) -> Ways:
     """Ways to places spread evenly over a flat lamp. depth (r, n): of the lamp along them; scale: its area."""
     inverse = 1 / np.sqrt(np.maximum((towards * towards).sum(axis=0), np.float32(1e-30)))
@@ -115,6 +121,7 @@ class Ball:
         self.color = np.array(lamp.intensity) / space.metres**2
         self.sized = self.radius > 0
         self.casts_shadow = lamp.casts_shadow
+        self.kind = self.sized, self.casts_shadow, self.facing_disc
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         x, y, z = self._towards(points)
@@ -127,7 +134,7 @@ class Ball:
         return cap_irradiance(cosine, sine) / self.radius**2
 
     def aim(self, points: Float32, unit: Float32) -> Ways:
-        towards = np.atleast_2d(self.position).T.astype(np.float32) - points
+        towards = _column(self.position).astype(np.float32) - points
         distance = np.sqrt((towards * towards).sum(axis=0))
         if not self.sized:
             return _spread(towards[:, None], distance[None], 1)
@@ -230,8 +237,10 @@ class Panel:
     """A flat convex polygon that emits alike over its area: an area lamp, or a triangle of an emitting surface.
 
     axes: origin and two axes of the coordinates that spread the unit square over it; round: it stands for the ellipse
-    about the origin with these half axes.
+    about the origin with these half axes. The same formulas serve many alike at once, see `crowd`.
     """
+
+    each = ("corners", "area", "normal", "half_spread", "axes", "_center", "_reach")
 
     def __init__(
         self,
@@ -255,12 +264,14 @@ class Panel:
         self.area = float(np.linalg.norm(fan)) / 2
         self.normal = fan / np.linalg.norm(fan)
         self.round = ellipse is not None
-        self.axes = ellipse or (corners[0], corners[1] - corners[0], corners[-1] - corners[0])
+        self.axes = np.stack(ellipse or (corners[0], corners[1] - corners[0], corners[-1] - corners[0]))
         self._center = corners.mean(axis=0)
         self._reach = _NEAR * 2 * float(np.linalg.norm(corners - self._center, axis=1).max())
         first, second = self.axes[1:]
         square = abs(first @ second) < 1e-6 * np.linalg.norm(first) * np.linalg.norm(second)
-        self._rectangular = len(corners) >= 4 and square
+        self._rectangular = bool(len(corners) >= 4 and square)
+        #: What panels have in common that are asked as one.
+        self.kind = len(corners), self.round, self._rectangular, two_sided, casts_shadow, self._is_even()
 
     @classmethod
     def from_area_lamp(cls, lamp: AreaLamp, space: Space) -> Panel:
@@ -291,30 +302,40 @@ class Panel:
         return polygon_irradiance(points, normals, self.corners, two_sided=self.two_sided)
 
     def aim(self, points: Float32, unit: Float32) -> Ways:
-        origin, first, second = (v.astype(np.float32)[:, None, None] for v in self.axes)
+        origin, first, second = (_column(axis)[:, None].astype(np.float32) for axis in self._axes())
         x, y = self._coordinates(unit)
         towards = origin + x * first + y * second - points[:, None]
-        depth = -np.tensordot(self.normal.astype(np.float32), towards, axes=1)
+        depth = -self._along_normal(towards)
         ways = _spread(towards, np.abs(depth) if self.two_sided else np.maximum(depth, 0), self.area / np.pi)
-        away = points - self._center.astype(np.float32)[:, None]
-        near = np.flatnonzero((away * away).sum(axis=0) < self._reach**2)
-        if len(near) and (self._rectangular or len(self.corners) == 3):
-            self._aim_nearby(ways, near, points[:, near].astype(np.float64), unit[:, :, near].astype(np.float64))
+        away = points - _column(self._center).astype(np.float32)
+        near = np.flatnonzero((away * away).sum(axis=0) < np.square(self._reach))
+        if len(near) and (self._rectangular or self.corners.shape[-2] == 3):
+            self.only(near).aim_nearby(ways, near, points[:, near].astype(float), unit[:, :, near].astype(float))
         return ways
 
-    def _aim_nearby(self, ways: Ways, near: np.ndarray, points: Float64, unit: Float64) -> None:
+    def only(self, chosen: NDArray[Any]) -> Panel:
+        """The panels of the chosen points, where there is one for each point."""
+        if self.corners.ndim == 2:
+            return self
+        some = copy(self)
+        for name in self.each:
+            setattr(some, name, getattr(self, name)[chosen])
+        return some
+
+    def aim_nearby(self, ways: Ways, near: NDArray[np.int64], points: Float64, unit: Float64) -> None:
         """Replace the ways from the nearby points by such as are spread over the lamp's solid angle."""
-        depth = (points - self._center[:, None]).T @ self.normal
+        depth = ((points - _column(self._center)) * _column(self.normal)).sum(axis=0)
         front = np.abs(depth) > 1e-9 if self.two_sided else depth > 1e-9
-        near, points, unit, depth = near[front], points[:, front], unit[:, :, front], depth[front]
+        depth = np.where(front, depth, 1.0)
         if self._rectangular:
             towards, solid, on_lamp = self._over_rectangle(points, depth, unit)
         else:
-            directions, solid = triangle_directions(self.corners[:, :, None] - points, unit)
-            slant = -np.tensordot(self.normal, directions, axes=1)
+            corners = np.stack([_column(self.corners[..., c, :]) for c in range(3)])
+            directions, solid = triangle_directions(corners - points, unit)
+            slant = -self._along_normal(directions)
             towards = directions * (depth / np.where(slant == 0, 1e-30, slant))
             on_lamp = np.ones(towards.shape[1:], dtype=bool)
-        usable = solid > _SLIVER
+        usable = front & (solid > _SLIVER)
         near, towards = near[usable], towards[:, :, usable]
         ways.towards[:, :, near] = towards
         ways.inverse[:, near] = 1 / np.sqrt((towards * towards).sum(axis=0))
@@ -322,30 +343,41 @@ class Panel:
 
     def _over_rectangle(self, points: Float64, depth: Float64, unit: Float64) -> tuple[Float64, Float64, np.ndarray]:
         """Ways (3, r, n) to places of the rectangle around the lamp, its solid angle (n,), which (r, n) lie on it."""
-        lengths = [np.linalg.norm(axis) for axis in self.axes[1:]]
-        first, second = (axis / length for axis, length in zip(self.axes[1:], lengths, strict=True))
-        from_origin = np.stack([first, second]) @ (self.axes[0][:, None] - points)
-        size = np.array(lengths)[:, None]
+        origin, *sides = (_column(axis) for axis in self._axes())
+        size = np.stack([np.linalg.norm(side, axis=0) for side in sides])
+        first, second = (side / length for side, length in zip(sides, size, strict=True))
+        from_origin = np.stack([(axis * (origin - points)).sum(axis=0) for axis in (first, second)])
         low = from_origin - size if self.round else from_origin
         places, solid = rectangle_places(low, from_origin + size, np.abs(depth), unit)
         x, y = places
-        across = self.normal[:, None] * -depth
-        towards = first[:, None, None] * x + second[:, None, None] * y + across[:, None]
+        across = _column(self.normal) * -depth
+        towards = first[:, None] * x + second[:, None] * y + across[:, None]
         offset = (places - from_origin[:, None]) / size[:, None]
         return towards, solid, (offset * offset).sum(axis=0) <= 1 if self.round else np.ones_like(x, dtype=bool)
 
     def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - all that counts is the way
         """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
         (tan h - tan a) / (tan h - h), as Cycles does it, a being the angle off the axis and h half the spread."""
-        if self.half_spread >= np.pi / 2 - 1e-6:
+        if self._is_even():
             return None
-        cosine = np.abs(np.tensordot(self.normal.astype(np.float32), ways.towards, axes=1)) * ways.inverse
-        edge = np.tan(self.half_spread)
+        cosine = np.abs(self._along_normal(ways.towards)) * ways.inverse
+        half = np.asarray(self.half_spread)
+        edge, rest = np.tan(half).astype(np.float32), (np.tan(half) - half).astype(np.float32)
         tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / np.maximum(cosine, 1e-9)
-        return np.maximum(edge - tangent, 0) / (edge - self.half_spread)
+        return np.maximum(edge - tangent, 0) / rest
+
+    def _is_even(self) -> bool:
+        return bool(np.all(np.asarray(self.half_spread) >= np.pi / 2 - 1e-6))
+
+    def _axes(self) -> list[Float64]:
+        return [self.axes[..., number, :] for number in range(3)]
+
+    def _along_normal(self, ways: NDArray[Real]) -> NDArray[Real]:
+        """How far (r, n) ways (3, r, n) lead along the lamp's normal."""
+        return np.asarray(np.einsum("k...,kr...->r...", self.normal.T.astype(ways.dtype), ways))
 
     def _coordinates(self, unit: Float32) -> tuple[Float32, Float32]:
-        if len(self.corners) == 3:
+        if self.corners.shape[-2] == 3:
             root = np.sqrt(unit[0])
             return root * (1 - unit[1]), root * unit[1]
         return disc(unit) if self.round else (unit[0], unit[1])

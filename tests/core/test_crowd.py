@@ -10,7 +10,7 @@ import pytest
 from radiosity_baker.core.direct.choice import chances
 from radiosity_baker.core.direct.crowd import Crowd
 from radiosity_baker.core.direct.illumination import MOST_ASKED, DirectLight
-from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.direct.lamps import Panel, place
 from radiosity_baker.core.patches import Space
 from radiosity_baker.core.scene import AreaLamp, PointLamp, SpotLamp, SunLamp
 from radiosity_baker.core.visibility import Visibility
@@ -42,7 +42,10 @@ def mixed(count: int = 60):
             area,
         )
         lamps.append(replace(kinds[k % len(kinds)], name=f"lamp {k}", casts_shadow=k % 7 > 0))
-    return [place(lamp, SPACE) for lamp in [*lamps, SunLamp("noon", (0.1, 0, -1), (1.0, 1.0, 1.0), angle=0.1)]]
+    lamps.append(SunLamp("noon", (0.1, 0, -1), (1.0, 1.0, 1.0), angle=0.1))
+    corners = rng.uniform(-0.9, 0.9, (8, 3, 3)) * [1.0, 1.0, 0.1] + [0.0, 0.0, 0.5]
+    glowing = [Panel("glow", own, rng.random(3), two_sided=k % 2 > 0) for k, own in enumerate(corners)]
+    return [*(place(lamp, SPACE) for lamp in lamps), *glowing]
 
 
 def points(count: int):
@@ -67,7 +70,7 @@ def test_the_lights_of_a_crowd_are_those_it_is_made_of():
         here = where[some.point].T.astype(np.float32)
         ways = light.aim(here, unit[:, :, some.point])
         gain = light.gain(here, ways)
-        for k in range(0, len(some.light), 40):
+        for k in range(0, len(some.light), 7):
             alone, at = lights[some.light[k]], slice(k, k + 1)
             own = alone.aim(here[:, at], unit[:, :, some.point[at]])
             np.testing.assert_allclose(ways.towards[:, :, at], own.towards, rtol=1e-5, atol=1e-6)
