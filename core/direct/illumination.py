@@ -244,15 +244,15 @@ class DirectLight:
         free[sample, point] = unblocked
         if tint is None:
             return _Look(weights, brings * free, free[None], free, free, rays)
-        passed = np.tile(free, (3, 1, 1)).astype(np.float32)
+        passed = np.tile(free, (len(tint), 1, 1)).astype(np.float32)
         passed[:, sample, point] = tint
         return _Look(weights, brings * passed, passed, free, (passed == 1).all(axis=0), rays)
 
     def _trace(
         self, receivers: _Receivers, towards: Float32, sample: NDArray[np.int64], point: NDArray[np.int64]
     ) -> tuple[Bool, Float32 | None, Counter[str]]:
-        """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (3, k) of the light passes,
-        or None where that is all; and the rays it took. Rays start a hair off the surface, and must not end as much
+        """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (1, k) or (3, k) of the light
+        passes, or None where that is all; and the rays it took. Rays start a hair off the surface, and must not end as much
         beyond their targets: a lamp that is a surface would be in its own way."""
         ways = towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]
         # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
@@ -263,7 +263,12 @@ class DirectLight:
             return self.visibility.unblocked_along(origins, ways), None, rays
         veiled = self.visibility.veiled_along(origins, ways)
         rays += Counter({"onward": veiled.onward, "cut off": veiled.cut})
-        return veiled.tint.max(axis=1) > 0, veiled.tint.T, rays
+        tint = veiled.tint.T
+        free = tint.max(axis=0) > 0
+        # Most ways meet no veil, and most veils are grey: three channels are for those that are not.
+        if (tint[0] == tint[1]).all() and (tint[1] == tint[2]).all():
+            return free, None if (tint[0] == free).all() else tint[:1], rays
+        return free, tint, rays
 
 
 class _Tally:
