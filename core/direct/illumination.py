@@ -251,9 +251,12 @@ class DirectLight:
     def _trace(
         self, receivers: _Receivers, towards: Float32, sample: NDArray[np.int64], point: NDArray[np.int64]
     ) -> tuple[Bool, Float32 | None, Counter[str]]:
-        """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (1, k) or (3, k) of the light
-        passes, or None where that is all; and the rays it took. Rays start a hair off the surface, and must not end as much
-        beyond their targets: a lamp that is a surface would be in its own way."""
+        """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (1, k) or (3, k) of the
+        light passes, or None where that is all; and the rays it took.
+
+        Rays start a hair off the surface, and must not end as much beyond their targets: a lamp that is a surface would
+        be in its own way.
+        """
         ways = towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]
         # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
         ways = np.ascontiguousarray(ways.T, dtype=np.float32)
@@ -263,12 +266,12 @@ class DirectLight:
             return self.visibility.unblocked_along(origins, ways), None, rays
         veiled = self.visibility.veiled_along(origins, ways)
         rays += Counter({"onward": veiled.onward, "cut off": veiled.cut})
-        tint = veiled.tint.T
-        free = tint.max(axis=0) > 0
+        red, green, blue = tint = np.ascontiguousarray(veiled.tint.T)
         # Most ways meet no veil, and most veils are grey: three channels are for those that are not.
-        if (tint[0] == tint[1]).all() and (tint[1] == tint[2]).all():
-            return free, None if (tint[0] == free).all() else tint[:1], rays
-        return free, tint, rays
+        if (red == green).all() and (green == blue).all():
+            free = red > 0
+            return free, None if (red == free).all() else tint[:1], rays
+        return tint.max(axis=0) > 0, tint, rays
 
 
 class _Tally:

@@ -17,8 +17,9 @@ _TOGETHER = """\
 
 One stage under a lamp, to which one thing after the other is added, with as many triangles and passes each time: what
 each costs alone, and what all down to its row cost, beside the sum of what the parts cost alone. No thing slows down
-what has nothing to do with it; but a veil is asked by the rays to every lamp that it hangs before, so with more lamps
-it costs more than alone. Seconds are good to a quarter on a machine that has other work to do; rays are exact.
+what has nothing to do with it. Where there are veils, each ray to a lamp looks for what is first in its way, which
+takes longer than whether anything is: so a veil costs a little more with more lamps. Seconds are good to a quarter on a
+machine that has other work to do; rays are exact.
 """
 _HEAD = "| Scene | Simulated | Typical error | Noise of reference | Bias | Processor seconds | Million rays | |"
 _RULE = "| --- | --- | ---: | ---: | ---: | ---: | --- | --- |"
