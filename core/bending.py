@@ -28,7 +28,7 @@ from .tessellation import Int64
 #: How often cells are split at most; passes over them before each time, and rays of each point that look around.
 _ROUNDS, _PASSES, _RAYS = 4, 4, 16
 #: Share of the asked error that may be left to the triangles.
-_SHARE = 0.7
+_SHARE = 0.5
 #: How often errors that are mostly noise are averaged with those around them.
 _BLURS = 2
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
