@@ -40,7 +40,7 @@ _SIDE_MOMENT = np.array([3, 5, 4])
 _SIDE_START, _SIDE_END = np.array([0, 0, 1, 0, 1, 2]), np.array([1, 2, 2, 3, 3, 3])
 
 #: How much the jumps of the gradient weigh: everywhere the same, or for each vertex (v,).
-Smoothing: TypeAlias = "float | Float64"
+Smoothing: TypeAlias = float | Float64
 
 
 class Samples:
