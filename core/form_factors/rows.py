@@ -17,6 +17,8 @@ Int64 = NDArray[np.int64]
 _CHUNK_ENTRIES = 65536
 #: More than what rounding to single precision adds to a number.
 _ROUNDING = 2.0**-22
+#: What a row may lack, relatively: after ten thousand bounces it is still nothing.
+_CLOSED = 1e-11
 #: Beyond this scaling targets cannot be met; the bound keeps the iteration finite.
 _MOST_SCALING = 1e6
 
@@ -139,7 +141,10 @@ def balance(
     # Rounded before the rest is told, and a hair too small: then the sums are exact in spite of single precision.
     rounded = (weights * np.minimum(excess[i], excess[j]) * (1.0 - _ROUNDING)).astype(np.float32)
     lacking = np.maximum(target - _sums(i, rounded, len(exchange)), 0.0)
-    return _with_diagonal(Rows(exchange.indptr, j, rounded), lacking)
+    closed = _with_diagonal(Rows(exchange.indptr, j, rounded), lacking)
+    # Where much is lacking that is rounded too, and what rounding takes or gives counts once for each bounce.
+    left = lacking - lacking.astype(np.float32)
+    return _with_diagonal(closed, left) if (np.abs(left) > _CLOSED * target).any() else closed
 
 
 def _with_diagonal(rows: Rows, diagonal: Float64) -> Rows:
