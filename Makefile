@@ -6,7 +6,7 @@
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
 # make accuracy    measure the samples against Cycles, for docs/accuracy.md: takes long
-# make bench       measure speed and honesty on six scenes beside Cycles, for docs/speed.md: takes 20 minutes
+# make bench       measure speed and honesty on six scenes beside Cycles, for docs/speed.md: takes half an hour
 # make effects     measure every effect against Cycles, for docs/effects.md
 # make colours     measure vertex colours beside Cycles' and the best fit, for docs/vertex_colours.md
 # make fuzz        try thousands of random scenes, and a thousand faults of each kind: takes hours

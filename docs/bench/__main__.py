@@ -1,6 +1,6 @@
 """Runs the benchmark and writes its tables into docs/speed.md and all figures into build/bench/bench.json.
 
-Without arguments everything, in about 20 minutes on two idle cores; the words around the tables stay as they were.
+Without arguments everything, in about half an hour on two idle cores; the words around the tables stay as they were.
 """
 
 from __future__ import annotations
