@@ -254,6 +254,7 @@ class Stages:
         )  # fmt: skip
 
     def __enter__(self):
+        self.workers.__enter__()
         return self
 
     def __exit__(self, *_):
