@@ -27,8 +27,8 @@ _LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 1000.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
 _BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 50.0, 900.0, 1500.0, 3300.0, 4000.0, 1300.0
-#: Of any bake, however small.
-_FIXED = 1.5e7
+#: Of any bake, however small, and of any round of finding where light bends.
+_FIXED, _ROUND = 1.5e7, 1.2e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
 _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
 
@@ -37,7 +37,7 @@ _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
 class Work:
     """What a bake has to do. transport, gather, shadow: rays; cells: the triangles that light is fitted to; own: the
     triangles that the scene itself has; fits: how often the light is fitted; contours: cells that they are looked for
-    in."""
+    in; rounds of finding where light bends."""
 
     transport: float = 0.0
     gather: float = 0.0
@@ -47,6 +47,7 @@ class Work:
     own: int = 0
     fits: int = 1
     contours: float = 0.0
+    rounds: float = 0.0
 
     @property
     def memory_mb(self) -> float:
@@ -69,6 +70,7 @@ class Machine:
         shared = work.gather * _LOOK + work.shadow * _AIM + factors * _FORM_FACTOR + work.cells * work.fits * _FIT
         alone = factors * _BALANCE + work.cells * (work.fits * _ASSEMBLE + _SPLIT_CELL)
         alone += work.patches * _SPLIT_PATCH + work.contours * _CONTOUR + work.own * _OWN + bool(work.cells) * _FIXED
+        alone += work.rounds * _ROUND
         return self.ray * (looks + work.transport) + self.number * (shared / self.threads + alone)
 
 

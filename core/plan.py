@@ -241,10 +241,8 @@ class _Prices:
 
     def _surveyed(self, effort: Effort) -> float:
         """Points that tell where light bends."""
-        if effort.coarsest <= 1.0:
-            return 0.0
-        rounds = min(1.0 + 0.2 / effort.error, _ROUNDS)
-        return rounds * _BEND_POINTS * (self._coarse(effort) + min(_called(effort.error), effort.triangles) / 2.0)
+        cells = self._coarse(effort) + min(_called(effort.error), effort.triangles) / 2.0
+        return _rounds(effort) * _BEND_POINTS * cells
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
@@ -283,7 +281,8 @@ class _Prices:
             if onward:
                 works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
         fits = (_BEND_FITS if surveyed else 0) + (1 if passes <= effort.passes else 2)
-        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=cells if surveyed else 0.0)}
+        contours = cells if surveyed else 0.0
+        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=contours, rounds=_rounds(effort))}
 
     def _passes(self, effort: Effort, cells: float) -> float:
         if self._settings.error is None:
@@ -292,6 +291,10 @@ class _Prices:
         rays = effort.gather_rays / _TYPICAL_RAYS
         sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
+
+
+def _rounds(effort: Effort) -> float:
+    return min(1.0 + 0.2 / effort.error, _ROUNDS) if effort.coarsest > 1.0 else 0.0
 
 
 def _called(error: float) -> float:

@@ -143,7 +143,7 @@ def balance(
     lacking = np.maximum(target - _sums(i, rounded, len(exchange)), 0.0)
     closed = _with_diagonal(Rows(exchange.indptr, j, rounded), lacking)
     # Where much is lacking that is rounded too, and what rounding takes or gives counts once for each bounce.
-    left = lacking - lacking.astype(np.float32)
+    left: Float64 = lacking - lacking.astype(np.float32)
     return _with_diagonal(closed, left) if (np.abs(left) > _CLOSED * target).any() else closed
 
 

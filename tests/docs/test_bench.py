@@ -53,6 +53,9 @@ def test_a_scene_beside_cycles_into_table_and_json(tmp_path, monkeypatch):
     rough, fine = scene["cycles"]
     assert rough["noise"] == pytest.approx(2 * fine["noise"])  # four times the samples
     assert rough["surface"] > fine["surface"] > scene["own"][0]["surface"] > 0
+    document.write_text(text.replace("| Courtyard |", "| changed |"), encoding="utf-8")
+    assert bench.main(["--tables", "--output", str(document)]) == 0
+    assert document.read_text(encoding="utf-8") == text
 
 
 @pytest.fixture
@@ -73,3 +76,10 @@ def test_growth_is_told_as_an_exponent(runs):
     grown = replace(runs[0], triangles=100, seconds=10.0)
     assert "the power of 1.00" in bench.report({"threads": 1, "scenes": {}, "original": [], "growth": [
         replace(runs[0], rays={"total": 1}), replace(grown, rays={"total": 1})]})  # fmt: skip
+
+
+def test_an_error_that_the_reference_hides_is_no_measure_of_honesty(runs):
+    known, hidden = (replace(run, stated=0.03, predicted=1.0, embree=1.0, rays={"total": 1}) for run in runs)
+    beside = bench.Beside((0.0, 0.0), [known], [replace(hidden, surface=0.0)], runs)
+    text = bench.report({"threads": 1, "scenes": {"courtyard": beside}, "original": [], "growth": []})
+    assert "1 of 1 within 0.7 to 1.5" in text
