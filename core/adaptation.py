@@ -134,7 +134,7 @@ class Adaptation:
                     self._mean = float(direct.mean() + total.mean())
                 # Where the sources shine nothing is hidden.
                 unlit = np.flatnonzero(near & (direct <= 0))
-                unlit = unlit[self._under_something(self._around, Points.of_pass(cells, chosen[unlit], k, shift))]
+                unlit = unlit[self._beneath(self._around, points.only(unlit))]
                 if len(unlit):
                     there = Points.of_pass(cells, chosen[unlit], k, shift)
                     total, enclosed = self._look(self._around, streams, there)
@@ -146,13 +146,10 @@ class Adaptation:
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
 
-    def _under_something(self, around: Surroundings, points: Points) -> Bool:
-        """Which of the points (n,) have the back of something straight above them, or something close: no others can be
-        inside a solid or a gap, and one ray tells what eight would."""
-        where = points.positions, points.normals
-        self.rays["contact"] += 2 * len(points.positions)
-        looks = around.hemispheres
-        return np.asarray(looks.inside(*where) | looks.covered(*where, GAP * points.size))
+    def _beneath(self, around: Surroundings, points: Points) -> Bool:
+        """Which of the points (n,) may be inside a solid or a gap: from the others nobody need look around."""
+        self.rays["contact"] += 2 * len(points.size)
+        return around.hemispheres.beneath(points.positions, points.normals, GAP * points.size)
 
     def _look(self, around: Surroundings, number: int, points: Points) -> tuple[Float64, Bool]:
         """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; and

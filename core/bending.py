@@ -16,7 +16,7 @@ from .direct.illumination import DirectLight
 from .gather import Points
 from .parallel import Workers
 from .patches import Cells
-from .plan import Effort
+from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
 from .refinement import fit_samples
 from .sampling import stream, subseed
@@ -25,8 +25,6 @@ from .splitting import until_allowed
 from .survey import GAP, Surroundings, Survey
 from .tessellation import Int64
 
-#: How often cells are split at most; passes over them before each time, and rays of each point that look around.
-_ROUNDS, _PASSES, _RAYS = 4, 4, 16
 #: Share of the asked error that may be left to the triangles.
 _SHARE = 0.5
 #: How often errors that are mostly noise are averaged with those around them.
@@ -49,7 +47,7 @@ class Bends:
     ) -> None:
         self.rays: Counter[str] = Counter()
         self._light = direct_light
-        self._around = around and around.with_rays(_RAYS, stream(seed, "bend patterns"))
+        self._around = around and around.with_rays(BEND_RAYS, stream(seed, "bend patterns"))
         self._effort = effort
         self._contours = contours
         self._seed = seed
@@ -58,12 +56,12 @@ class Bends:
     def refine(self, scene: Scene, receivers: Receivers, limit: int) -> Receivers:
         """The receivers with at most about `limit` cells, cut along contours, and finer where light still bends by more
         than is allowed."""
-        for number in range(_ROUNDS):
+        for number in range(BEND_ROUNDS):
             trial, source = self._contours.cut(receivers)
             # Other samples than those of the bake: its noise must not depend on which cells theirs has split.
             seed = subseed(self._seed, f"bends {number}")
             survey = Survey(trial, self._light, self._around, self._effort, seed, self._workers)
-            for _ in range(_PASSES):
+            for _ in range(BEND_PASSES):
                 survey.run_pass()
             self.rays += survey.rays
             chosen = self._worst(scene, survey, receivers.cells, source, limit)
@@ -96,7 +94,7 @@ class Bends:
         looks = self._around.hemispheres
         points = Points(survey.receivers.cells, hidden, np.full((len(hidden), 3), 1 / 3))
         where = points.positions, points.normals
-        bounds, closed = (looks.covered(*where, reach * points.size) for reach in (GAP, GAP / 2**_ROUNDS))
+        bounds, closed = (looks.covered(*where, reach * points.size) for reach in (GAP, GAP / 2**BEND_ROUNDS))
         self.rays["contact"] += 3 * len(hidden)
         return hidden[bounds & ~closed & ~looks.inside(*where)]
 

@@ -284,8 +284,7 @@ class Contours:
                 some, whole, rays["shadow"] = self._light.shadows(*where, None if asked is None else asked[part])
                 sight = some | whole << _WHOLE
             if reach is not None and self._around is not None:
-                looks = self._around.hemispheres
-                sight += _COVERED * (looks.inside(*where) | looks.covered(*where, reach[part]))
+                sight += _COVERED * self._around.hemispheres.beneath(*where, reach[part])
                 rays["contact"] += 2 * len(sight)
             return sight, rays
 

@@ -124,6 +124,11 @@ class Hemispheres:
         ways = (reach[:, None] * normals).astype(np.float32)
         return ~self._visibility.unblocked_along(offset_along(points, normals), ways)
 
+    def beneath(self, points: Float64, normals: Float64, reach: Float64) -> Bool:
+        """Whether each point (n, 3) is under something: its back is straight above, or it is within reach (n,). No
+        others can be inside a solid or a gap. Takes two rays of each point."""
+        return self.inside(points, normals) | self.covered(points, normals, reach)
+
     def inside(self, points: Float64, normals: Float64) -> Bool:
         """Whether what lies straight above each point (n, 3) shows its back: it may be inside a solid."""
         directions = normals.astype(np.float32)

@@ -57,9 +57,10 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 4_000, 1.75
-#: Finding that takes up to so many rounds, of so many points in each cell with so many rays; a fit in each, of fewer
-#: cells than there are in the end. Contours take so many points for each cell.
-_ROUNDS, _BEND_POINTS, _BEND_RAYS, _BEND_FITS, _CONTOUR_POINTS = 4.0, 4, 16, 2, 12
+#: Finding that takes so many rounds at most, passes over all cells in each, and rays of each point that look around.
+BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
+#: Each round has a fit, of fewer cells than there are in the end; contours take so many points for each cell.
+_BEND_FITS, _CONTOUR_POINTS = 2, 12
 #: Share of the cells in which the shadow of one lamp ends; error from which on these need many points.
 _CROSSED, _UNCERTAIN = 0.05, 0.05
 #: Each step of thrift leaves this share of the work.
@@ -242,7 +243,7 @@ class _Prices:
     def _surveyed(self, effort: Effort) -> float:
         """Points that tell where light bends."""
         cells = self._coarse(effort) + min(_called(effort.error), effort.triangles) / 2.0
-        return _rounds(effort) * _BEND_POINTS * cells
+        return _rounds(effort) * BEND_PASSES * cells
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
@@ -273,7 +274,7 @@ class _Prices:
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
             look = Work(
                 transport=2 * patches * effort.transport_rays,
-                gather=cells * passes * effort.gather_rays + surveyed * _BEND_RAYS,
+                gather=cells * passes * effort.gather_rays + surveyed * BEND_RAYS,
                 patches=patches,
             )
             works[first] = replace(look, shadow=works[first].shadow) if first in works else look
@@ -294,7 +295,7 @@ class _Prices:
 
 
 def _rounds(effort: Effort) -> float:
-    return min(1.0 + 0.2 / effort.error, _ROUNDS) if effort.coarsest > 1.0 else 0.0
+    return min(1.0 + 0.2 / effort.error, BEND_ROUNDS) if effort.coarsest > 1.0 else 0.0
 
 
 def _called(error: float) -> float:

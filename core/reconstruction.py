@@ -8,6 +8,7 @@ space and jump nowhere, so the mean of every connected surface is kept exactly.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -265,12 +266,17 @@ class Fit:
     def nearby(self, amounts: Float64) -> Float64:
         """(v,) how much of the amounts of the cells (c,) there is around each vertex, spread as far as _RINGS steps of
         chance lead from vertex to vertex: over some hundred cells, but over no edge where the fit breaks."""
-        spread = SymmetricMatrix(self._pattern, np.ones(self._count), np.ones(len(self._pair_penalty)))
-        share = 1.0 / (spread @ np.ones((self._count, 1)))
+        spread, share = self._spread
         near = self._scatter(np.repeat(amounts[:, None], 3, axis=1))[:, None]
         for _ in range(_RINGS):
             near = spread @ (share * near)
         return np.asarray(near[:, 0])
+
+    @cached_property
+    def _spread(self) -> tuple[SymmetricMatrix, Float64]:
+        """Sums over each vertex and those that it is tied to; and one over their number (v, 1)."""
+        spread = SymmetricMatrix(self._pattern, np.ones(self._count), np.ones(len(self._pair_penalty)))
+        return spread, 1.0 / (spread @ np.ones((self._count, 1)))
 
     def bending(self, one: Float64, other: Float64) -> Float64:
         """(c,) mean over each cell of the product of the gradient's jumps in two fits (v, 1): their common squared

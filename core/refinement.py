@@ -136,8 +136,7 @@ def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
     if around is None:
         return by_patches
     reflected = fits[1].values[:, around.reflected].mean(axis=1)
-    on_cells = reflected[receivers.corner_vertex[receivers.cells.element]].mean(axis=1)
-    return by_patches + (level_error(around.level_doubts) * on_cells) ** 2
+    return by_patches + (level_error(around.level_doubts) * receivers.at_cells(reflected)) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,5 +235,5 @@ def mean_reflected(receivers: Receivers, colours: Colours, irradiance: Float64) 
     """Mean radiance, W/(m^2 sr), over the receivers and the channels, that cells of these colours reflect of the mean
     irradiance (v,) at the vertices."""
     cells = receivers.cells
-    on_cells = irradiance[receivers.corner_vertex[cells.element]].mean(axis=1)
-    return float(cells.area @ (colours.albedo.mean(axis=1) * on_cells) / cells.area.sum() / np.pi)
+    reflected = colours.albedo.mean(axis=1) * receivers.at_cells(irradiance)
+    return float(cells.area @ reflected / cells.area.sum() / np.pi)

@@ -13,7 +13,7 @@ _MORE = 5
 
 def over_fair_share(weight: Float64, fair: float, room: int) -> Int64:
     """Those of largest weight (n,) that weigh more than a fair share each, and add about `room` cells at most."""
-    return _largest(weight, int(np.count_nonzero(weight > fair)), room)
+    return _largest(weight, room)[: np.count_nonzero(weight > fair)]
 
 
 def until_allowed(weight: Float64, allowed: float, room: int) -> Int64:
@@ -21,11 +21,12 @@ def until_allowed(weight: Float64, allowed: float, room: int) -> Int64:
     cells at most."""
     if weight.sum() <= allowed:
         return np.zeros(0, dtype=np.int64)
-    largest_first = np.sort(np.maximum(weight, 0.0))[::-1]
-    left = largest_first.sum() - np.cumsum(largest_first)
-    return _largest(weight, int(np.count_nonzero(left > allowed)) + 1, room)
+    largest = _largest(weight, room)
+    left = np.maximum(weight, 0.0).sum() - np.cumsum(weight[largest])
+    return largest[: np.count_nonzero(left > allowed) + 1]
 
 
-def _largest(weight: Float64, count: int, room: int) -> Int64:
-    count = min(count, max(room // _MORE, 0), int(np.count_nonzero(weight > 0.0)))
+def _largest(weight: Float64, room: int) -> Int64:
+    """Those of positive weight, the largest first, as many as there is room for."""
+    count = min(max(room // _MORE, 0), int(np.count_nonzero(weight > 0.0)))
     return np.argsort(-weight, kind="stable")[:count]

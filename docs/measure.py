@@ -13,12 +13,12 @@ import sys
 from pathlib import Path
 
 from radiosity_baker.addon.headless import main
+from radiosity_baker.docs.bench.scenes import SAMPLES as SCENES
 
 DOCS = Path(__file__).resolve().parent
 SAMPLES = DOCS.parent / "sample_blends"
 #: References stay here, so that measuring again costs only the bakes.
 SCRATCH = DOCS.parent / "build" / "accuracy"
-SCENES = ("cornell_box_area_lamp", "cornell_box_emitter", "living_room", "stage")
 
 
 def measure(name: str, arguments: list[str]) -> str:

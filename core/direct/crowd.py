@@ -9,14 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..scene import Float64
 from .choice import chances, draw
-from .lamps import Ball, Light, Panel
+from .lamps import Light, some_of
 
 #: Numbers of one array, and lights asked at once: what a processor's cache holds.
 _TABLE, _ASKED = 1 << 14, 1 << 13
@@ -56,7 +55,7 @@ class Crowd:
         """How much of each light arrives (l, n) at points (n, 3) with normals (n, 3), as if it shone evenly."""
         shares = np.empty((len(self._color), len(points)))
         for light, some in self._kinds:
-            shares[some] = _chosen(light, np.s_[:, None]).share(points, normals)
+            shares[some] = some_of(light, np.s_[:, None]).share(points, normals)
         return shares
 
     def choose(
@@ -89,33 +88,20 @@ class Crowd:
             own = np.flatnonzero(kind == number)
             for begin in range(0, len(own), _ASKED):
                 some = asked.only(own[begin : begin + _ASKED])
-                yield _chosen(light, self._place[some.light]), some
+                yield some_of(light, self._place[some.light]), some
 
 
 def _kind(light: Light, number: int) -> object:
     """What lights have in common that can be asked together; others stand alone."""
-    return (type(light), light.kind) if isinstance(light, Ball) or type(light) is Panel else number
+    return (type(light), light.kind) if light.each else number
 
 
 def _together(lights: Sequence[Light]) -> Light:
     """Lights of one kind as one, with the numbers of each, (l, ...)."""
     together = copy(lights[0])
-    for name in _each(together):
+    for name in together.each:
         setattr(together, name, np.array([getattr(light, name) for light in lights]))
     return together
-
-
-def _chosen(light: Light, chosen: Any) -> Light:
-    """The same with only the chosen numbers, any index."""
-    some = copy(light)
-    for name in _each(light):
-        setattr(some, name, getattr(light, name)[chosen])
-    return some
-
-
-def _each(light: Light) -> tuple[str, ...]:
-    """What there is one of for each of the lights, if there are several."""
-    return light.each if isinstance(light, Ball) or type(light) is Panel else ()
 
 
 def _joined(parts: Sequence[Asked]) -> Asked:

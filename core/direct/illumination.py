@@ -62,8 +62,23 @@ class _Receivers:
     along: Float32
     origins: Float32
 
+    @classmethod
+    def of(cls, points: Float64, normals: Float64, shading: Float64) -> _Receivers:
+        along = np.stack([points.T, normals.T, shading.T]).astype(np.float32)
+        return cls(along, offset_along(points, normals))
+
     def only(self, chosen: NDArray[np.int64]) -> _Receivers:
         return _Receivers(self.along[:, :, chosen], self.origins[chosen])
+
+    def ways(self, towards: Float32, sample: NDArray[np.int64], point: NDArray[np.int64]) -> tuple[Float32, Float32]:
+        """Origins and ways (k, 3) of shadow rays along some samples of what lies (3, r, n) towards the light.
+
+        Rays start a hair off the surface, and must not end as much beyond their targets: a lamp that is a surface would
+        be in its own way.
+        """
+        ways = towards[:, sample, point] - np.float32(OFFSET) * self.along[1][:, point]
+        # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
+        return self.origins[point], np.ascontiguousarray(ways.T, dtype=np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,8 +124,7 @@ class DirectLight:
         self, points: Float64, normals: Float64, shading: Float64, rays: int, rng: np.random.Generator
     ) -> Illumination:
         """At points (n, 3) with geometric and shading normals (n, 3), `rays` shadow rays to each sized light."""
-        along = np.stack([points.T, normals.T, shading.T]).astype(np.float32)
-        tally = _Tally(_Receivers(along, offset_along(points, normals)))
+        tally = _Tally(_Receivers.of(points, normals, shading))
         if self._crowd is not None:
             self._ask_some(self._crowd, tally, points, shading, rays, rng)
         else:
@@ -131,8 +145,7 @@ class DirectLight:
         """Lights of which some is hidden from each point (n, 3) by something else than the surface itself, with normals
         (n, 3), and lights that are hidden as a whole: two numbers (n,), a bit for each light; and the rays it took.
         What shines through veils is not hidden. asked (n,): bits of the lights to ask there, None for all."""
-        along = np.stack([points.T, normals.T, normals.T]).astype(np.float32)
-        origins = offset_along(points, normals)
+        receivers = _Receivers.of(points, normals, normals)
         some, whole = np.zeros((2, len(points)), dtype=np.int64)
         rays = 0
         for number, light in enumerate(self.lights):
@@ -140,18 +153,16 @@ class DirectLight:
             if not light.casts_shadow or not len(ask):
                 continue
             rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
-            ways = light.aim(along[0][:, ask], np.repeat(rim, len(ask), axis=2))
-            gain = light.gain(along[0][:, ask], ways)
+            own = receivers.only(ask)
+            ways = light.aim(own.along[0], np.repeat(rim, len(ask), axis=2))
+            gain = light.gain(own.along[0], ways)
             lit = (ways.solid if gain is None else ways.solid * gain.reshape(-1, *ways.solid.shape).max(axis=0)) > 0
-            lit &= (ways.towards * along[1][:, None, ask]).sum(axis=0) > 0
-            place, point = np.nonzero(lit)
-            towards = ways.towards[:, place, point] - np.float32(OFFSET) * along[1][:, ask[point]]
-            towards = np.ascontiguousarray(towards.T, dtype=np.float32)
+            lit &= (ways.towards * own.along[1][:, None]).sum(axis=0) > 0
             hidden = np.zeros(lit.shape, dtype=bool)
-            hidden[lit] = ~self.visibility.unblocked_along(origins[ask[point]], towards)
+            hidden[lit] = ~self.visibility.unblocked_along(*own.ways(ways.towards, *np.nonzero(lit)))
             some[ask] |= hidden.any(axis=0).astype(np.int64) << number
             whole[ask] |= (lit.any(axis=0) & (hidden | ~lit).all(axis=0)).astype(np.int64) << number
-            rays += len(place)
+            rays += int(lit.sum())
         return some, whole, rays
 
     def _ask(self, light: Light, receivers: _Receivers, share: Float64, rays: int, rng: np.random.Generator) -> _Answer:
@@ -252,15 +263,8 @@ class DirectLight:
         self, receivers: _Receivers, towards: Float32, sample: NDArray[np.int64], point: NDArray[np.int64]
     ) -> tuple[Bool, Float32 | None, Counter[str]]:
         """Which (k,) of the ways (3, r, n) of some samples from some points are free; what (1, k) or (3, k) of the
-        light passes, or None where that is all; and the rays it took.
-
-        Rays start a hair off the surface, and must not end as much beyond their targets: a lamp that is a surface would
-        be in its own way.
-        """
-        ways = towards[:, sample, point] - np.float32(OFFSET) * receivers.along[1][:, point]
-        # A lamp whose size is a number of numpy's would make them double, from numpy 2 on.
-        ways = np.ascontiguousarray(ways.T, dtype=np.float32)
-        origins = receivers.origins[point]
+        light passes, or None where that is all; and the rays it took."""
+        origins, ways = receivers.ways(towards, sample, point)
         rays = Counter(shadow=len(sample))
         if not self.visibility.veiled:
             return self.visibility.unblocked_along(origins, ways), None, rays

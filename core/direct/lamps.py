@@ -48,19 +48,36 @@ class Ways:
 
 class Light(Protocol):
     """A light source in the unit box. color (3,) float64. sized: whether its shadows are soft; casts_shadow: whether
-    it has any; round: whether it looks like a disc."""
+    it has any; round: whether it looks like a disc.
+
+    Lights of one class and kind can be asked together, see `crowd`: as one light with an array of each of the numbers
+    that `each` names. What stands alone names none.
+    """
 
     name: str
     color: Float64
     sized: bool
     casts_shadow: bool
     round: bool
+    each: tuple[str, ...]
+    kind: tuple[object, ...]
 
     def share(self, points: Float64, normals: Float64) -> Float64: ...
 
     def aim(self, points: Float32, unit: Float32) -> Ways: ...
 
     def gain(self, points: Float32, ways: Ways) -> Float32 | None: ...
+
+
+Lights = TypeVar("Lights", bound=Light)
+
+
+def some_of(lights: Lights, chosen: Any) -> Lights:
+    """Of lights that are asked together those with the chosen numbers, any index."""
+    some = copy(lights)
+    for name in lights.each:
+        setattr(some, name, getattr(lights, name)[chosen])
+    return some
 
 
 def place(lamp: Lamp, space: Space) -> Light:
@@ -121,7 +138,7 @@ class Ball:
         self.color = np.array(lamp.intensity) / space.metres**2
         self.sized = self.radius > 0
         self.casts_shadow = lamp.casts_shadow
-        self.kind = self.sized, self.casts_shadow, self.facing_disc
+        self.kind: tuple[object, ...] = self.sized, self.casts_shadow, self.facing_disc
 
     def share(self, points: Float64, normals: Float64) -> Float64:
         x, y, z = self._towards(points)
@@ -201,6 +218,8 @@ class Sun:
     """Parallel light from a disc in the sky."""
 
     round = True
+    each: tuple[str, ...] = ()
+    kind: tuple[object, ...] = ()
 
     def __init__(self, lamp: SunLamp) -> None:
         self.name = lamp.name
@@ -240,7 +259,7 @@ class Panel:
     about the origin with these half axes. The same formulas serve many alike at once, see `crowd`.
     """
 
-    each = ("corners", "area", "normal", "half_spread", "axes", "_center", "_reach")
+    each: tuple[str, ...] = ("corners", "area", "normal", "half_spread", "axes", "_center", "_reach")
 
     def __init__(
         self,
@@ -271,7 +290,8 @@ class Panel:
         square = abs(first @ second) < 1e-6 * np.linalg.norm(first) * np.linalg.norm(second)
         self._rectangular = bool(len(corners) >= 4 and square)
         #: What panels have in common that are asked as one.
-        self.kind = len(corners), self.round, self._rectangular, two_sided, casts_shadow, self._is_even()
+        alike = self.round, self._rectangular, two_sided, casts_shadow, self._is_even()
+        self.kind: tuple[object, ...] = (len(corners), *alike)
 
     @classmethod
     def from_area_lamp(cls, lamp: AreaLamp, space: Space) -> Panel:
@@ -315,12 +335,7 @@ class Panel:
 
     def only(self, chosen: NDArray[Any]) -> Panel:
         """The panels of the chosen points, where there is one for each point."""
-        if self.corners.ndim == 2:
-            return self
-        some = copy(self)
-        for name in self.each:
-            setattr(some, name, getattr(self, name)[chosen])
-        return some
+        return self if self.corners.ndim == 2 else some_of(self, chosen)
 
     def aim_nearby(self, ways: Ways, near: NDArray[np.int64], points: Float64, unit: Float64) -> None:
         """Replace the ways from the nearby points by such as are spread over the lamp's solid angle."""

@@ -43,6 +43,8 @@ class Window(Panel):
     What leaves through one of the portals before it as well, is theirs.
     """
 
+    each: tuple[str, ...] = ()
+
     def __init__(self, name: str, portal: Rectangle, sky: Sky, before: list[Rectangle]) -> None:
         super().__init__(name, portal.corners, np.zeros(3), two_sided=False)
         self._sky = sky
