@@ -15,13 +15,16 @@ from xml.etree import ElementTree as ET
 ROOT = Path(__file__).resolve().parent.parent
 #: Environments as the Makefile names them.
 ENVIRONMENTS = (".venv-4.5", ".venv", ".venv-3.13")
+#: pytest's report of each, and of the program, where tests/gui/cases.py leaves it.
+REPORTS = {name: ROOT / "build" / f"reliability{name}.xml" for name in (*ENVIRONMENTS, ".blender")}
 HEADING = """# What was tried to break it
 
 Written by `make reliability`: the hard cases of [tests/hard_cases](../tests/hard_cases) on each Blender that has an
-environment here (`make test` and `make test-4.5` set them up). Exact values come from closed forms; what a result may
-be off is derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever stands in
-it. Below the cases: what random scenes must keep, and which faults are injected, with how often, here and in the last
-long run (`make fuzz`, on one Blender). `radiosity-baker self-test` prints the closed forms in any Blender.
+environment here as a Python module (`make test` and `make test-4.5` set them up), and in the program itself, with the
+extension as it is installed (`tests/gui/run --cases`). Exact values come from closed forms; what a result may be off is
+derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever stands in it. Below
+the cases: what random scenes must keep, and which faults are injected, with how often, here and in the last long run
+(`make fuzz`, on one Blender). `radiosity-baker self-test` prints the closed forms in any Blender.
 """
 #: What the long run leaves behind, as tests/hard_cases/conftest.py writes it.
 LONG_RUN = ROOT / "build" / "fuzz.jsonl"
@@ -29,44 +32,34 @@ LONG_RUN = ROOT / "build" / "fuzz.jsonl"
 
 def main() -> None:
     """Run, and write the tables."""
-    versions, results = [], []
-    for environment in ENVIRONMENTS:
-        python = ROOT / environment / "bin" / "python"
-        if python.exists():
-            versions.append(_version(python))
-            report = ROOT / "build" / f"reliability{environment}.xml"
-            if "tables" not in sys.argv:
+    if "tables" not in sys.argv:
+        for name, report in REPORTS.items():
+            report.unlink(missing_ok=True)
+            python = ROOT / name / "bin" / "python"
+            if python.exists():
                 _run(python, report)
-            results.append(_outcomes(report))
-    (ROOT / "docs" / "reliability.md").write_text("\n".join(_tables(versions, results)) + "\n", encoding="utf-8")
-
-
-def _version(python: Path) -> str:
-    said = subprocess.run(  # noqa: S603 - this repository's own environment
-        [python, "-c", "import bpy; print(*bpy.app.version, sep=chr(46))"], capture_output=True, text=True, check=True
-    )
-    return said.stdout.split()[-1]
+        subprocess.run([ROOT / "tests" / "gui" / "run", "--cases"], check=False)  # noqa: S603 - a script of ours
+    reports = [ET.parse(path) for path in REPORTS.values() if path.exists()]  # noqa: S314 - pytest's own reports
+    lines = _tables([_blender(report) for report in reports], [_outcomes(report) for report in reports])
+    (ROOT / "docs" / "reliability.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def _run(python: Path, report: Path) -> None:
     report.parent.mkdir(exist_ok=True)
-    command = [
-        python,
-        "-m",
-        "pytest",
-        "--quiet",
-        "tests/hard_cases",
-        f"--junitxml={report}",
-        "-o",
-        "junit_family=xunit1",
-    ]
+    kept = [f"--junitxml={report}", "-o", "junit_family=xunit1"]
+    command = [python, "-m", "pytest", "--quiet", "tests/hard_cases", *kept]
     subprocess.run(command, cwd=ROOT, check=False)  # noqa: S603 - a failure is a line of the table
 
 
-def _outcomes(report: Path) -> dict[str, dict[str, str]]:
+def _blender(report: ET.ElementTree) -> str:
+    """What tests/hard_cases/conftest.py says of the Blender that ran them."""
+    return next(p.get("value", "") for p in report.iterfind("testsuite/properties/property"))
+
+
+def _outcomes(report: ET.ElementTree) -> dict[str, dict[str, str]]:
     """Properties of each test, by its name, with its verdict."""
     cases = {}
-    for case in ET.parse(report).iter("testcase"):  # noqa: S314 - pytest's own report
+    for case in report.iter("testcase"):
         failed = case.find("failure") is not None or case.find("error") is not None
         skipped = case.find("skipped") is not None
         verdict = "FAILED" if failed else "skipped" if skipped else "ok"

@@ -6,6 +6,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import bpy
 import pytest
 from hypothesis import settings
 
@@ -15,7 +16,7 @@ LONG_RUN = Path(__file__).resolve().parents[2] / "build" / "fuzz.jsonl"
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
-    if report.when == "call" and settings.get_current_profile_name() == "fuzz":
+    if report.when == "call" and settings.default is settings.get_profile("fuzz"):
         LONG_RUN.parent.mkdir(exist_ok=True)
         verdict = "ok" if report.passed else "FAILED" if report.failed else "skipped"
         told = {"name": report.nodeid.split("::")[-1], "verdict": verdict, **dict(report.user_properties)}
@@ -23,6 +24,13 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
             told["problem"] = report.longreprtext
         with LONG_RUN.open("a", encoding="utf-8") as lines:
             lines.write(json.dumps(told, default=str) + "\n")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _blender(record_testsuite_property):
+    """Which Blender this is, and whether as a Python module or as the program."""
+    kind = "program" if bpy.app.binary_path else "module"
+    record_testsuite_property("blender", f"{bpy.app.version_string} ({kind})")
 
 
 @pytest.fixture
@@ -43,4 +51,4 @@ def told(record_property):
 @pytest.fixture
 def long_run() -> bool:
     """Whether this is `make fuzz`, which repeats what `make test` does a few times."""
-    return settings.get_current_profile_name() == "fuzz"
+    return settings.default is settings.get_profile("fuzz")

@@ -205,7 +205,7 @@ def layers_of(result) -> dict[str, np.ndarray]:
 
 def tries(count: int):
     """So many scenes in `make test`, always the same; many times as many, and new ones, with the profile `fuzz`."""
-    fuzz = settings.get_current_profile_name() == "fuzz"
+    fuzz = settings.default is settings.get_profile("fuzz")
     asked = settings(
         max_examples=count * (FUZZ_FACTOR if fuzz else 1),
         derandomize=not fuzz,
