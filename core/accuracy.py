@@ -67,6 +67,8 @@ _FEW = 0.01
 STEP_BEND, PARABOLA_BEND = 6.0, 70.0
 #: Relative error up to which the halves are fitted: they only tell errors that are larger.
 _ROUGH = 2e-3
+#: How many times as bright as its samples' mean a vertex begins at most.
+_MOST_BRIGHTER = 4.0
 #: By what share of itself the samples' own noise may be misjudged: the two sets of rays that tell are not quite
 #: independent.
 _MISJUDGED = 0.01
@@ -77,33 +79,36 @@ _MISJUDGED = 0.01
 COARSENING = 3.0**0.75 - 1.0
 
 
-def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -> Fitted:
+def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0) -> Fitted:
     """Fit with the alpha at which, around each vertex, each half of the samples best predicts the other
     (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
-    a squared error of the light there counts."""
+    a squared error of the light there counts. loose: how many times as far as usual fits may be from the best."""
     merged = halves[0] + halves[1]
     limits = fit.limits(merged)
     grey = [half.grey() for half in halves]
     systems = [fit.system(half) for half in grey]
     tried: list[_Halves] = []
-    start: list[Float64 | None] = [None, None]
+    best = [fit.averages(system) for system in systems]
     smoother = fit.measured
     level = np.zeros(len(smoother), dtype=np.int64)
     for alpha in ALPHAS:
-        values = [fit.solve(system, alpha, begin, _ROUGH) for system, begin in zip(systems, start, strict=True)]
+        # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
+        rough = _ROUGH * (loose if tried else 1.0)
+        values = [fit.solve(system, alpha, begin, rough, ~smoother) for system, begin in zip(systems, best, strict=True)]
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
         low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
         first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
         predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
         if tried:
-            smoother = smoother & (fit.nearby(area * (tried[-1].predicted - predicted)) > 0.0)
+            better = np.where(fit.at_corners(smoother).all(axis=1), tried[-1].predicted - predicted, 0.0)
+            smoother = smoother & (fit.nearby(area * better) > 0.0)
             if smoother.sum() <= _FEW * len(smoother):
                 break
             level[smoother] = len(tried)
         else:
             bend = fit.bending(*values)
         tried.append(_Halves(first, second, predicted))
-        start = [*values]
+        best = [np.where(smoother[:, None], fresh, kept) for fresh, kept in zip(values, best, strict=True)]
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
     distance = sharpest.predicted - sharpest.spread / 2.0
@@ -116,8 +121,19 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64) -
         sampling += share * smoothed.spread / 4.0
         unseen += share * smoothed.smoothed_by(sharpest)
     chosen = np.array(ALPHAS)[level]
-    together = fit.solve_within(fit.system(merged), chosen, limits)
+    system = fit.system(merged)
+    start = _in_colour((best[0] + best[1])[:, 0] / 2.0, fit.averages(system), merged.to_grey)
+    together = fit.solve_within(system, chosen, limits, start, loose)
     return Fitted(chosen, together, together @ halves[0].to_grey, sampling, unseen)
+
+
+def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
+    """Averages (v, k), made as bright as a fit (v,) of the mean light is: most of their noise is common to the channels,
+    and so is gone."""
+    before = averages @ to_grey
+    lit = before > 0.0
+    brighter = np.divide(grey, before, out=np.ones_like(before), where=lit)
+    return averages * np.clip(brighter, 0.0, _MOST_BRIGHTER)[:, None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -159,27 +159,42 @@ class Fit:
         )
 
     def solve(
-        self, system: System, alpha: Smoothing, start: Float64 | None = None, tolerance: float | None = None
+        self,
+        system: System,
+        alpha: Smoothing,
+        start: Float64 | None = None,
+        tolerance: float | None = None,
+        held: Bool | None = None,
     ) -> Float64:
         """Vertex values (v, k), unfilled where nothing was measured, with gradient jumps weighed by alpha, everywhere
         the same or for each vertex (v,).
 
         start (v, k): where to begin; by default plain averaging, which is near already. tolerance: relative error; by
-        default a tenth of the finest that is asked for.
+        default a tenth of the finest that is asked for. held (v,): which keep their start.
         """
-        start = self._averages(system) if start is None else start
+        start = self.averages(system) if start is None else start
         most = _TOLERANCE if tolerance is None else tolerance
-        return conjugate_gradients(self.matrix(system, alpha), system.target, start, most, _MAXIMUM_ITERATIONS)
+        matrix, still = self.matrix(system, alpha), None if held is None else held[:, None]
+        return conjugate_gradients(matrix, system.target, start, most, _MAXIMUM_ITERATIONS, still)
 
-    def solve_within(self, system: System, alpha: Smoothing, limits: tuple[Float64, Float64]) -> Float64:
+    def solve_within(
+        self,
+        system: System,
+        alpha: Smoothing,
+        limits: tuple[Float64, Float64],
+        start: Float64 | None = None,
+        loose: float = 1.0,
+    ) -> Float64:
         """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
 
         Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
         the vertex is held at the limit, and the others make the best of that; the mean stays that of the samples.
+        loose: how many times as far off as those of `solve` they may be.
         """
         matrix = self.matrix(system, alpha)
-        accuracy = _TOLERANCE, _MAXIMUM_ITERATIONS
-        free = conjugate_gradients(matrix, system.target, self._averages(system), *accuracy)
+        accuracy = loose * _TOLERANCE, _MAXIMUM_ITERATIONS
+        start = self.averages(system) if start is None else start
+        free = conjugate_gradients(matrix, system.target, start, *accuracy)
         low, high = within(limits, alpha)
         values = np.clip(free, low, high)
         held = values != free
@@ -219,7 +234,8 @@ class Fit:
             values = values * np.maximum(1.0 - np.divide(rest, total, out=np.zeros_like(rest), where=lit), 0.0)
         return values
 
-    def _averages(self, system: System) -> Float64:
+    def averages(self, system: System) -> Float64:
+        """Vertex values (v, k): the mean of the samples around each."""
         averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
         return np.where(self.measured[:, None], averaged, 0.0)
 

@@ -23,6 +23,8 @@ from .transport import in_three_channels
 
 #: Squared sampling error, relative to that of the rest, which no longer shows beside it.
 _HIDDEN = 0.25
+#: Up to which error fits are as near to the best as they can be; and how many times as far from it at most, beyond.
+_TIGHT, _MOST_LOOSE = 0.01, 10.0
 #: How often the error is estimated anew, and how many times as many passes each time at most: more cannot be foreseen.
 _MOST_ROUNDS, _MOST_GROWTH = 3, 4
 
@@ -160,7 +162,10 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     colours = cell_colours(scene, receivers)
     area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
     in_sight = area * survey.share_in_sight
-    fits = list(workers.map(lambda number, _: fit_halves(fit, sampled[number], in_sight, shown), len(sampled), 1))
+    loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
+    fits = list(
+        workers.map(lambda number, _: fit_halves(fit, sampled[number], in_sight, shown, loose), len(sampled), 1)
+    )
     reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
     emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
     return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)

@@ -205,6 +205,11 @@ class Survey:
         self._mean = 0.0
 
     @property
+    def error(self) -> float:
+        """What is asked for, relative."""
+        return self._effort.error
+
+    @property
     def missed_sky(self) -> float:
         """Irradiance W/m^2 that the sky may bring all the same where no ray has met it; 0 where one has, or it is
         black."""

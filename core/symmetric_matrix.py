@@ -7,34 +7,34 @@ import numpy as np
 from .scene import Bool, Float64
 from .tessellation import Int64
 
-#: Share of the rows that are kept in line whole; what longer rows have beyond that width is kept aside.
-_IN_LINE = 0.98
 #: What rounding leaves of a residual, relative to the target.
 _ROUNDING = 1e-12
-#: Rows a chunk of the product: its terms stay in the processor's caches.
-_CHUNK_ROWS = 8192
+#: Places for entries in a block of rows: what is done with them stays in the processor's caches.
+_BLOCK = 1 << 15
 
 
 class SymmetricPattern:
     """Where a symmetric matrix has entries: on its diagonal, and at (i, j) and (j, i) for each pair (m, 2).
 
-    A pair that is named twice counts twice. Found once, it serves every set of values.
+    A pair that is named twice counts twice. Found once, it serves every set of values. The rows lie in blocks of nearly
+    equal length, the longest first: rows (r,), and for each place (w, r) the column of its entry and the pair that it
+    has its value from. Places that no pair fills take a value behind the last pair's, which is zero.
     """
 
     def __init__(self, count: int, pairs: Int64) -> None:
         row, column = pairs.T.ravel(), pairs[:, ::-1].T.ravel()
         order = np.argsort(row, kind="stable")
+        # One more, for the places that are not filled.
+        column, pair = np.append(column[order], 0), np.append(order % max(len(pairs), 1), len(pairs))
         length = np.bincount(row, minlength=count)
-        width = max(int(np.quantile(length, _IN_LINE, method="higher")), 1) if count else 1
-        place = np.arange(len(row)) - np.repeat(np.cumsum(length) - length, length)
-        row, column, pair = row[order], column[order], order % max(len(pairs), 1)
-        inside = place < width
-        self.columns = np.zeros((count, width), dtype=np.int64)
-        # Places that no pair fills take a value behind the last pair's, which is zero.
-        self.pair = np.full((count, width), len(pairs), dtype=np.int64)
-        self.columns[row[inside], place[inside]] = column[inside]
-        self.pair[row[inside], place[inside]] = pair[inside]
-        self.beyond = row[~inside], column[~inside], pair[~inside]
+        first = np.cumsum(length) - length
+        longest = np.argsort(-length, kind="stable")[: np.count_nonzero(length)]
+        self.blocks: list[tuple[Int64, Int64, Int64]] = []
+        while len(longest):
+            places = np.arange(length[longest[0]])[:, None]
+            rows, longest = np.split(longest, [max(_BLOCK // len(places), 1)])
+            entry = np.where(places < length[rows], first[rows] + places, len(order))
+            self.blocks.append((rows, column[entry], pair[entry]))
 
 
 class SymmetricMatrix:
@@ -42,29 +42,21 @@ class SymmetricMatrix:
 
     def __init__(self, pattern: SymmetricPattern, diagonal: Float64, values: Float64) -> None:
         self.diagonal = diagonal
-        self._columns = pattern.columns
-        self._values = np.append(values, 0.0)[pattern.pair]
-        row, column, pair = pattern.beyond
-        self._rest = row, column, values[pair]
+        values = np.append(values, 0.0)
+        self._blocks = [(rows, columns, values[pair]) for rows, columns, pair in pattern.blocks]
 
     def __matmul__(self, x: Float64) -> Float64:
         """(n, k) to (n, k)."""
-        row, column, value = self._rest
-        product = np.empty_like(x)
-        terms = np.empty((_CHUNK_ROWS, self._columns.shape[1]))
-        for k in range(x.shape[1]):
-            channel = np.ascontiguousarray(x[:, k])
-            image = self.diagonal * channel
-            for start in range(0, len(channel), _CHUNK_ROWS):
-                part = slice(start, start + _CHUNK_ROWS)
-                columns = self._columns[part]
+        channels = np.ascontiguousarray(x.T)
+        product = self.diagonal * channels
+        terms = np.empty(max((columns.size for _, columns, _ in self._blocks), default=0))
+        for rows, columns, values in self._blocks:
+            taken = terms[: columns.size].reshape(columns.shape)
+            for channel, image in zip(channels, product, strict=True):
                 # Clipping never happens; it only spares numpy a copy of what it takes.
-                taken = np.take(channel, columns, out=terms[: len(columns)], mode="clip")
-                image[part] += np.einsum("vw,vw->v", self._values[part], taken)
-            if len(row):
-                image += np.bincount(row, value * channel[column], len(channel))
-            product[:, k] = image
-        return product
+                np.take(channel, columns, out=taken, mode="clip")
+                image[rows] += np.einsum("wr,wr->r", values, taken)
+        return product.T
 
 
 def conjugate_gradients(
