@@ -94,7 +94,9 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, l
     for alpha in ALPHAS:
         # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
         rough = _ROUGH * (loose if tried else 1.0)
-        values = [fit.solve(system, alpha, begin, rough, ~smoother) for system, begin in zip(systems, best, strict=True)]
+        values = [
+            fit.solve(system, alpha, begin, rough, ~smoother) for system, begin in zip(systems, best, strict=True)
+        ]
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
         low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
         first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
@@ -128,8 +130,7 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, l
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
-    """Averages (v, k), made as bright as a fit (v,) of the mean light is: most of their noise is common to the channels,
-    and so is gone."""
+    """Averages (v, k), made as bright as a fit (v,) of the mean light: noise that the channels share is gone."""
     before = averages @ to_grey
     lit = before > 0.0
     brighter = np.divide(grey, before, out=np.ones_like(before), where=lit)
@@ -175,7 +176,8 @@ def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float6
 
 def squared_mean(corners: Float64) -> Float64:
     """Mean (c,) over each triangle of the square of linear functions with corner values (c, 3)."""
-    return np.asarray((corners.sum(axis=1) ** 2 + (corners**2).sum(axis=1)) / 12.0)
+    x, y, z = corners.T
+    return np.asarray((x * (x + y + z) + y * (y + z) + z * z) / 6.0)
 
 
 def level_error(doubts: tuple[tuple[float, float], ...]) -> float:

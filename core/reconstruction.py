@@ -100,11 +100,12 @@ class Samples:
 
     def squared_residual(self, corners: Float64) -> Float64:
         """Mean (c,) of (mean light - interpolated)^2 over each cell's samples, for corner values (c, 3)."""
-        product = corners[:, _ROW] * corners[:, _COLUMN]
-        product[:, 3:] *= 2.0
-        total = self.squares - 2.0 * np.einsum("ci,ci->c", self.light @ self.to_grey, corners)
-        total += np.einsum("ci,ci->c", self.moments, product)
-        return np.maximum(total, 0.0) / np.maximum(self.count, 1.0)
+        m, light = self.moments.T, (self.light @ self.to_grey).T
+        x, y, z = corners.T
+        total = x * (m[0] * x + 2.0 * (m[3] * y + m[4] * z - light[0]))
+        total += y * (m[1] * y + 2.0 * (m[5] * z - light[1]))
+        total += z * (m[2] * z - 2.0 * light[2])
+        return np.maximum(self.squares + total, 0.0) / np.maximum(self.count, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -246,14 +247,17 @@ class Fit:
         1 / sqrt(n) of the triangle's size, so light may go on rising or falling by twice that share of what it does
         among them; but not where the other side is out of sight.
         """
-        shape = (self._count, samples.low.shape[1])
+        shape = (samples.low.shape[1], self._count)
         low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
         cut_off = np.zeros(self._count, dtype=bool)
         for corner in self._corner.T:
-            np.minimum.at(low, corner, samples.low)
-            np.maximum.at(high, corner, samples.high)
-            cut_off[corner[samples.tried > samples.count]] = True
-        low, high = (np.where(np.isfinite(limit), limit, 0.0) for limit in (low, high))
+            # Numbers in one piece, channel by channel: so numpy is ten times as fast.
+            numbers = np.ascontiguousarray(corner)
+            for k in range(len(low)):
+                np.minimum.at(low[k], numbers, samples.low[:, k])
+                np.maximum.at(high[k], numbers, samples.high[:, k])
+            cut_off[numbers[samples.tried > samples.count]] = True
+        low, high = (np.where(np.isfinite(limit), limit, 0.0).T for limit in (low, high))
         samples_around = self._scatter(np.repeat(samples.count[:, None], 3, axis=1))
         share = np.where(self._surrounded | cut_off, 0.0, 2.0 / np.sqrt(np.maximum(samples_around, 4.0)))
         beyond = share[:, None] * (high - low)
