@@ -63,8 +63,11 @@ def shoot_until(
 
 
 def contraction(factors: Rows, albedo: Float64) -> float:
-    """Q = the largest share of the light on any side that comes back from it: albedo times row sum."""
-    return float(np.max(albedo.max(axis=1) * factors.row_sums(), initial=0.0))
+    """Q = the most that any side gets back where all are lit by one: a bounce brings at most q times what is brightest.
+
+    By the sides that send, not by the one that receives: a dark plate over a white floor gets what the floor loses.
+    """
+    return float(np.max(factors.apply(albedo.max(axis=1)), initial=0.0))
 
 
 def solve(
@@ -78,7 +81,7 @@ def solve(
     factors = exchange.scaled(1.0 / area)
     q = contraction(factors, albedo)
     for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
-        # Every later pass brings at most q times the pass before it: the rest of the series is geometric.
+        # Nowhere does a later pass bring more than q times the pass before it: the rest of the series is geometric.
         bound = _relative(residual * q, accumulated) / max(1.0 - q, 1e-12)
         if bound <= tolerance:
             return Solution(accumulated, done, bound)
