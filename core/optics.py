@@ -37,7 +37,7 @@ def stopping_share(surface: Surface) -> float:
     onward = max(surface.glass) + max(surface.mirror)
     if max(surface.emission) > 0:
         diffuse = max(diffuse, _FEWEST_STOPS)
-    return float(np.clip(diffuse, 1.0 - onward, max(1.0 - onward / 2.0, 0.0)))
+    return float(np.clip(diffuse, 1.0 - onward, max(1.0 - onward / 2.0, diffuse / max(diffuse + onward, 1.0))))
 
 
 @dataclass(frozen=True, eq=False)

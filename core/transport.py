@@ -16,7 +16,7 @@ from .parallel import Workers
 from .patches import Patches, coarser_groups
 from .plan import Effort, Plan
 from .sampling import stream
-from .scene import Float32, Float64
+from .scene import ALBEDO_LIMIT, Float32, Float64
 from .sky import Sky
 from .solver import Solution, contraction, shoot_until, solve, solve_both_sides
 from .visibility import Visibility
@@ -252,6 +252,9 @@ def estimate_exchange(
             balance(symmetric_exchange(matrix, area, samples), area * share, workers)
             for matrix, share in zip(found.rows, kept.T, strict=True)
         )
+        if patches.optics is not None and patches.optics.tinted:
+            rows = tuple(_without_gain(matrix, found.sides, channel) for channel, matrix in enumerate(rows))
+            lost = kept + lost - np.stack([matrix.row_sums() for matrix in rows], axis=1) / area[:, None]
         alone = sum((one_sided(matrix, area) for matrix in found.rows), np.zeros(len(area))) / len(rows)
         return Exchange(found.sides, rows, found.opening, lost, found.glints, alone, found.rays, reciprocal=True)
     estimator = analytic_rows if effort.estimator == "analytic" else centroid_rows
@@ -262,6 +265,20 @@ def estimate_exchange(
         return Exchange(estimate.sides, (estimate.rows,), opening, nothing, None, alone, rays, reciprocal=False)
     matrix = balance(symmetric_exchange(estimate.rows, area), area * (1.0 - opening.share), workers)
     return Exchange(estimate.sides, (matrix,), opening, nothing, None, alone, rays, reciprocal=True)
+
+
+def _without_gain(exchange: Rows, sides: Sides, channel: int) -> Rows:
+    """The exchange areas, with less where chance lets a side receive more than all sides together can send.
+
+    A patch at which few rays of a colour stop sends them more than all light, so that it is right on average; but few
+    rays are no average, and light that grows from bounce to bounce has no solution.
+    """
+    patches = sides.patches
+    sent = patches.albedo[:, channel] + (0.0 if patches.transmission is None else patches.transmission[:, channel])
+    received = exchange.apply(sent[sides.patch]) / sides.area
+    share = ALBEDO_LIMIT / np.maximum(received, ALBEDO_LIMIT)
+    weights = exchange.weights * (share[exchange.owners()] * share[exchange.columns])  # so that both ways round alike
+    return replace(exchange, weights=weights.astype(np.float32))
 
 
 def light_on_sides(

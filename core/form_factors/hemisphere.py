@@ -154,8 +154,14 @@ def hemisphere_rows(
     if patches.optics is None:
         opening = Opening(look.escaped / counted, look.skylight / counted[:, None])
         return Exchanged(sides, (_mutual(rows[0], sides),), opening, np.zeros(len(look.side)), None, cast)
-    opening = Opening((look.escaped.T / counted).T, look.skylight / counted[:, None])
-    lost = 1.0 - opening.share - np.stack([r.row_sums() for r in rows], axis=1).reshape(opening.share.shape)
+    escaped = (look.escaped.T / counted).T
+    found = escaped + np.stack([r.row_sums() for r in rows], axis=1).reshape(escaped.shape)
+    if patches.optics.tinted:
+        # A few rays whose tints are over one, as others' are under it, may bring more than all there is.
+        over = np.maximum(found, 1.0)
+        escaped, found = escaped / over, found / over
+    opening = Opening(escaped, look.skylight / counted[:, None])
+    lost = 1.0 - found
     glints = np.pi * look.glints / counted[:, None] if look.glints.any() else None
     cast += Counter({"onward": int(look.onward.sum()), "cut off": int(look.cut.sum())})
     rows = tuple(_mutual(matrix, sides) for matrix in rows)
