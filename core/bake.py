@@ -80,7 +80,7 @@ def bake(
             receivers = make_receivers(scene, space, settings, start)
             patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers, pilot)
             del pilot  # it holds a copy of the scene
-            direct_light = DirectLight(lights, visibility, settings.seed)
+            direct_light = DirectLight(lights, visibility, settings.seed, effort.lights)
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
@@ -90,7 +90,9 @@ def bake(
             )
         sampled, sky_light = direct_light, None
         if of_sky and "sky" in settings.layers:
-            sampled, sky_light = (DirectLight(part, visibility, settings.seed) for part in (others, of_sky))
+            sampled, sky_light = (
+                DirectLight(part, visibility, settings.seed, effort.lights) for part in (others, of_sky)
+            )
         survey = Survey(receivers, sampled, surroundings, effort, settings.seed, workers, sky_light)
         survey.rays.update(rays)
         baked = Baked(planned, patches, halves, survey)
@@ -113,7 +115,7 @@ def first_light(
         min(chosen.effort.triangles, _ROUGH),
     )
     patches = make_patches(around, space, split_objects(around, 1))
-    straight = DirectLight(lights, Visibility(patches.corners, patches.optics), settings.seed)
+    straight = DirectLight(lights, Visibility(patches.corners, patches.optics), settings.seed, chosen.effort.lights)
     survey = Survey(receivers, straight, None, chosen.effort, settings.seed, workers)
     survey.run_pass()
     return Baked(chosen, patches, (), survey), average_light(survey)

@@ -27,6 +27,8 @@ from .tessellation import Int64
 
 #: Share of the asked error that may be left to the triangles.
 _SHARE = 0.5
+#: Squared error that is left of a cell once it is split: half where light steps, a sixteenth where it curves.
+_KEPT = 0.25
 #: How often errors that are mostly noise are averaged with those around them.
 _BLURS = 2
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
@@ -56,33 +58,48 @@ class Bends:
     def refine(self, scene: Scene, receivers: Receivers, limit: int) -> Receivers:
         """The receivers with at most about `limit` cells, cut along contours, and finer where light still bends by more
         than is allowed."""
+        survey = None
         for number in range(BEND_ROUNDS):
             trial, source = self._contours.cut(receivers)
-            # Other samples than those of the bake: its noise must not depend on which cells theirs has split.
-            seed = subseed(self._seed, f"bends {number}")
-            survey = Survey(trial, self._light, self._around, self._effort, seed, self._workers)
-            for _ in range(BEND_PASSES):
-                survey.run_pass()
-            self.rays += survey.rays
-            chosen = self._worst(scene, survey, receivers.cells, source, limit)
+            survey = self._surveyed(trial, number, survey)
+            chosen, enough = self._worst(scene, survey, receivers.cells, source, limit)
             if not chosen.any():
                 return trial
             receivers = split_cells(receivers, chosen)[0]
+            if enough:
+                break
         return self._contours.cut(receivers)[0]
 
-    def _worst(self, scene: Scene, survey: Survey, cells: Cells, source: Int64, limit: int) -> Bool:
-        """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room."""
+    def _surveyed(self, receivers: Receivers, number: int, earlier: Survey | None) -> Survey:
+        """Samples of the receivers' cells, of those that an earlier survey had as well the same."""
+        # Other samples than those of the bake: its noise must not depend on which cells theirs has split.
+        seed = subseed(self._seed, f"bends {number}")
+        survey = Survey(receivers, self._light, self._around, self._effort, seed, self._workers)
+        if earlier is not None:
+            survey.recall(earlier)
+        for _ in range(BEND_PASSES):
+            survey.run_pass()
+        self.rays += survey.rays
+        return survey
+
+    def _worst(self, scene: Scene, survey: Survey, cells: Cells, source: Int64, limit: int) -> tuple[Bool, bool]:
+        """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room; and
+        whether it will be once they are split, so that nobody need look again."""
         found = fit_samples(survey, scene, self._workers)
         direct, *indirect = (fitted.resolution for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
         pieces = found.area * found.shown * sum((_blurred(error, survey.receivers) for error in indirect), direct)
+        # Of what is over a gap nothing is known: it may be off by all of the mean light.
+        gaps = self._over_gaps(survey)
+        pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
         squared = np.bincount(source, pieces, len(cells)).astype(np.float64)
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         large = cells.area > _SMALLEST * cells.area.sum() / limit
         chosen = np.zeros(len(cells), dtype=bool)
-        chosen[until_allowed(squared, allowed, limit - len(source))] = True
-        chosen[source[self._over_gaps(survey)]] = True
-        return np.asarray(chosen & large)
+        kept = _KEPT * max(squared.sum(), 0.0)
+        chosen[until_allowed(squared, max((allowed - kept) / (1.0 - _KEPT), allowed / 2.0), limit - len(source))] = True
+        chosen &= large
+        return chosen, bool(squared.sum() - (1.0 - _KEPT) * squared[chosen].sum() <= allowed)
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for

@@ -20,6 +20,7 @@ import numpy as np
 from .convexity import nothing_stands_between
 from .direct.illumination import MOST_CONTOURED, DirectLight
 from .gather import Points, gather_direct
+from .keys import key
 from .parallel import Workers
 from .receivers import Receivers, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
@@ -53,8 +54,6 @@ _SHADOW_RAYS, _RAYS = 8, 16
 _BARRED_UP_TO = 0.98
 #: Points in a chunk; a number of streams that nothing else uses.
 _CHUNK, _STREAM = 8192, 4_000_000
-#: Irrational, so that no sum of places on a grid is another's.
-_MIX = np.sqrt([2.0, 3.0, 5.0])
 #: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
 #: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
 _WHOLE, _BARRED, _COVERED = MOST_CONTOURED, 1 << 2 * MOST_CONTOURED, 1 << 2 * MOST_CONTOURED + 1
@@ -83,10 +82,9 @@ class _Edges:
         corners, unit = receivers.cells.corners[cell], np.eye(3)
         ends = corners[each, one], corners[each, other]
         length = np.linalg.norm(ends[0] - ends[1], axis=1)
-        # Where an edge is and which way it faces tell it from all others; sums that are not of squares would be the
-        # same for both diagonals of a square.
-        key = sum(_mixed(end) ** 2 for end in ends) + _mixed(receivers.cells.normals[cell])
-        return cls(cell, unit[one], unit[other], unit[(corner + 2) % 3], length, key)
+        return cls(
+            cell, unit[one], unit[other], unit[(corner + 2) % 3], length, key(ends, receivers.cells.normals[cell])
+        )
 
     def only(self, chosen: Int64) -> _Edges:
         return _Edges(*(getattr(self, field.name)[chosen] for field in fields(self)))
@@ -345,12 +343,6 @@ class Contours:
         breaks = np.zeros(3 * len(near), dtype=bool)
         breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
-
-
-def _mixed(vectors: Float64) -> Float64:
-    """A number (n,) for each of some vectors (n, 3), which hardly two of them share."""
-    x, y, z = vectors.T
-    return np.asarray(_MIX[0] * x + _MIX[1] * y + _MIX[2] * z)
 
 
 def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:

@@ -39,7 +39,7 @@ def patches_by_light(
     split = split_objects(scene, effort.patches)
     patches = make_patches(scene, space, split)
     visibility = pilot.visibility_for(patches)
-    light = DirectLight(lights, visibility, seed)
+    light = DirectLight(lights, visibility, seed, effort.lights)
     triangles = len(patches.area)
     fresh, fair = np.arange(len(patches)), 0.0
     for level in range(_LEVELS if lights else 0):

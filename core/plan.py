@@ -73,10 +73,11 @@ class Effort:
 
     error: relative, to aim at; triangles: at most, where no size is asked for; coarsest: with how many times fewer
     adaptation starts; growth: how many times as many it may add where a size is asked for; patches: wanted number;
-    transport_rays: of a patch side; shadow_rays: to a lamp with size; gather_rays: of a sample point; passes over all
-    cells before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
-    uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
-    triangles are too many to be lamps; channels: 3, or 1 where everything is grey.
+    transport_rays: of a patch side; shadow_rays: to a lamp with size; lights: asked at a point by each half of the rays
+    where there are too many; gather_rays: of a sample point; passes over all cells before the error is first estimated,
+    boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the solve;
+    threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be lamps;
+    channels: 3, or 1 where everything is grey.
     """
 
     error: float
@@ -87,6 +88,7 @@ class Effort:
     patches: int
     transport_rays: int
     shadow_rays: int
+    lights: int
     gather_rays: int
     passes: int
     boundary_passes: int
@@ -258,7 +260,7 @@ class _Prices:
         suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
         windows = len(scene.portals) if planned.active("portals") else 0
         count = len(scene.lamps) + pieces + suns + windows
-        asked = min(1.0, MOST_ASKED / max(count, 1))
+        asked = effort.lights / count if count > MOST_ASKED else 1.0
         crossed = (1.0 - (1.0 - _CROSSED) ** count) * min(_UNCERTAIN / effort.error, 1.0) ** 2
         points = cells * (passes + effort.boundary_passes * crossed)
         if surveyed and count <= MOST_CONTOURED:
@@ -319,6 +321,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
+        lights=int(MOST_ASKED * min(0.02 / asked, 1.0) ** 0.5),
         gather_rays=gather_rays(asked, sum(len(o.triangles) for o in scene.receivers())),
         passes=2,
         boundary_passes=8,

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from .receivers import Receivers, numbered_edges, shared_edges
 from .scene import Bool, Float64, Int32
 from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradients
+from .tessellation import Int64
 
 #: Relative error at which conjugate gradients stop: a tenth of what a person asks for at the finest.
 _TOLERANCE = 5e-4
@@ -76,6 +77,11 @@ class Samples:
         self.high[index] = np.maximum(self.high[index], np.where(valid[:, None], values, -np.inf))
         self.count[index] += valid
         self.tried[index] += 1
+
+    def recall(self, earlier: Samples, here: Int64, there: Int64) -> None:
+        """Samples of some cells (n,) are those of others (n,) in an earlier set."""
+        for name in ("moments", "light", "squares", "noise", "low", "high", "count", "tried"):
+            getattr(self, name)[here] = getattr(earlier, name)[there]
 
     def __add__(self, other: Samples) -> Samples:
         total = Samples(0, self.to_grey)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from .direct.illumination import DirectLight, Illumination
 from .gather import Points, gather_direct, gather_indirect, shadow_boundary
 from .hemisphere import Hemispheres
+from .keys import same_cells
 from .parallel import Workers
 from .patches import Patches
 from .plan import Effort
@@ -203,6 +204,25 @@ class Survey:
         self._signatures: list[NDArray[np.int64]] = []
         self._extra = 0
         self._mean = 0.0
+        #: The cells that passes look at.
+        self._fresh = np.arange(count)
+        self._index: NDArray[np.int64] | slice = slice(None)
+
+    def recall(self, earlier: Survey) -> None:
+        """Before the first pass: take the samples of the cells that an earlier survey had as well, and look at the
+        others only."""
+        here, there = same_cells(self.receivers.cells, earlier.receivers.cells)
+        for halves, known in ((self.indirect, earlier.indirect), (self.direct, earlier.direct)):
+            for samples, others in zip(halves, known, strict=True):
+                samples.recall(others, here, there)
+        for coarser, other in zip(self.coarser, earlier.coarser, strict=True):
+            coarser[here] = other[there]
+        self.invalid[here] = earlier.invalid[there]
+        for signature in earlier._signatures:
+            self._signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
+            self._signatures[-1][here] = signature[there]
+        self._mean = earlier._mean
+        self._fresh = self._index = np.setdiff1d(self._fresh, here)
 
     @property
     def error(self) -> float:
@@ -242,21 +262,24 @@ class Survey:
         return self.direct[0].lumped + self.direct[1].lumped
 
     def run_pass(self) -> None:
-        """One more point in every cell."""
-        number = self.passes
-        every = np.arange(len(self.receivers.cells))
-        points = Points.of_pass(self.receivers.cells, every, number, self._shift)
+        """One more point in every cell, or in every one that was not recalled."""
+        number, fresh = self.passes, self._fresh
+        self.passes += 1
+        if number == len(self._signatures):
+            self._signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
+        if not len(fresh):
+            return
+        points = Points.of_pass(self.receivers.cells, fresh, number, self._shift)
         light = self._direct(points, number)
-        valid = np.ones(len(every), dtype=bool)
+        valid = np.ones(len(fresh), dtype=bool)
         if self.surroundings is not None:
             valid = self._look_around(self.surroundings, points, light, number)
-        self.invalid |= ~valid
-        self._add_direct(number, slice(None), points, light, valid)
-        self._signatures.append(light.signature)
-        self.passes += 1
+        self.invalid[fresh] |= ~valid
+        self._add_direct(number, self._index, points, light, valid)
+        self._signatures[number][fresh] = light.signature
 
     def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
-        """Add the indirect light at the points; which of them (c,) are in sight."""
+        """Add the indirect light at the points of a pass; which of them (n,) are in sight."""
         half, columns = number % 2, len(around.to_grey)
         table = around.tables[half] if number < 2 else around.tables[half][:, :columns]
         arriving, deviation, enclosed, rays = gather_indirect(
@@ -265,10 +288,11 @@ class Survey:
         self.rays += rays
         values = arriving[:, :columns]
         if number < 2:
-            self.coarser[half] = arriving[:, columns] - values[:, around.reflected].mean(axis=1)
+            self.coarser[half][self._fresh] = arriving[:, columns] - values[:, around.reflected].mean(axis=1)
         direct = light.grey
         total = values @ around.to_grey + direct
-        self._mean = float(total.mean())
+        if len(total) == len(self.invalid):
+            self._mean = float(total.mean())
 
         def look(some: Points) -> Float64:
             seen, cast = (self._glance or around).light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
@@ -277,7 +301,7 @@ class Survey:
 
         valid = ~out_of_sight(points, around, enclosed, total, direct, self._mean, look)
         noise = (deviation[:, :columns] @ around.to_grey) ** 2
-        self.indirect[half].add(slice(None), points.barycentric, values, noise, valid)
+        self.indirect[half].add(self._index, points.barycentric, values, noise, valid)
         return valid
 
     def refine_boundaries(self, passes: int) -> None:

@@ -21,8 +21,8 @@ _NEGLIGIBLE = 1e-7
 #: Places on the rim of a disc, and at the corners of a rectangle or a triangle.
 _RIM = np.array([[0.98, 0.98, 0.98, 0.98], [0.0, 0.25, 0.5, 0.75]], dtype=np.float32)
 _CORNERS = np.array([[0.01, 0.99, 0.99, 0.01], [0.01, 0.01, 0.99, 0.99]], dtype=np.float32)
-#: Of more lights than this, each half of the rays asks so many at a point. Noise falls much faster with this number
-#: than time grows, up to about here: then rays cost more than the closed forms of all lights.
+#: Of more lights than this, each half of the rays asks at most so many at a point. Noise falls much faster with this
+#: number than time grows, up to about here: then rays cost more than the closed forms of all lights.
 MOST_ASKED = 24
 #: The shadows of more lights than this are each too faint to be worth a contour.
 MOST_CONTOURED = 16
@@ -110,12 +110,14 @@ Source = Light | EmitterTree
 
 
 class DirectLight:
-    """All sources that are sampled as lights, and the occluders between."""
+    """All sources that are sampled as lights, and the occluders between. asked: how many of more than MOST_ASKED lights
+    each half of the rays asks at a point."""
 
-    def __init__(self, sources: Sequence[Source], visibility: Visibility, seed: int) -> None:
+    def __init__(self, sources: Sequence[Source], visibility: Visibility, seed: int, asked: int = MOST_ASKED) -> None:
         self.lights = lights = [source for source in sources if not isinstance(source, EmitterTree)]
         self._trees = [source for source in sources if isinstance(source, EmitterTree)]
         self._crowd = Crowd(lights) if len(lights) > MOST_ASKED else None
+        self._asked = asked
         self.visibility = visibility
         # A random bit pattern for each light: the sum over the lights seen names their set.
         self._names = stream(seed, "light names").integers(1, 2**40, size=len(lights))
@@ -185,7 +187,7 @@ class DirectLight:
         Each half of the rays draws lights of its own, one ray to each. As with a single light, what the drawn ones
         would bring with nothing in the way is corrected by what all would bring.
         """
-        sure, drawn, rest = crowd.choose(points, shading, MOST_ASKED, rng)
+        sure, drawn, rest = crowd.choose(points, shading, self._asked, rng)
         count = len(points)
         for light, some in crowd.alike(sure):
             answer = self._ask(light, tally.receivers.only(some.point), some.share, rays, rng)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.bending import Bends
 from radiosity_baker.core.patches import triangle_geometry
 from radiosity_baker.core.receivers import shared_edges
 from radiosity_baker.core.result import BakedObject
@@ -95,3 +96,26 @@ def test_coarse_triangles_over_a_gap_get_fine_enough_to_look_into_it(build):
         _, area = centres_and_areas(ground_baked)
         above = area @ ground_baked.layers["combined"].mean(axis=(1, 2)) / area.sum()
     assert under[0] == pytest.approx(under[1], abs=0.04 * above)
+
+
+def test_nobody_looks_again_where_what_is_split_is_enough(build, monkeypatch):
+    """A lamp near a square: at 2 % some triangles are split, but those who asked for 0.5 % must look what came of it.
+    Either keeps what it promised."""
+    looks, split = [], []
+    look, choose = Bends._surveyed, Bends._worst
+
+    def counted(self, *given):
+        chosen, enough = choose(self, *given)
+        split.append(chosen.sum())
+        return chosen, enough
+
+    monkeypatch.setattr(Bends, "_surveyed", lambda *given: looks.append(given[2]) or look(*given))
+    monkeypatch.setattr(Bends, "_worst", counted)
+    scene = Scene((build.quad(),), (build.grey,), (PointLamp("lamp", (0.5, 0.5, 0.3), (1.0, 1.0, 1.0)),))
+    rough = bake(scene, Settings(triangles=6000, error=0.02, threads=2)).report
+    assert looks == [0]
+    assert split[0] > 0
+    assert rough.estimated_error["resolution"] <= 0.02
+    fine = bake(scene, Settings(triangles=6000, error=0.005, threads=2)).report
+    assert looks[1:4] == [0, 1, 2]
+    assert fine.estimated_error["resolution"] <= 0.005

@@ -1,0 +1,38 @@
+"""Numbers by which cells and edges are known again after others were split: where they are and which way they face."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .patches import Cells
+from .scene import Float64
+from .tessellation import Int64
+
+#: Irrational, so that no sum of places on a grid is another's.
+_MIX = np.sqrt([2.0, 3.0, 5.0])
+
+
+def mixed(vectors: Float64) -> Float64:
+    """A number (n,) for each of some vectors (n, 3), which hardly two of them share."""
+    x, y, z = vectors.T
+    return np.asarray(_MIX[0] * x + _MIX[1] * y + _MIX[2] * z)
+
+
+def key(corners: Sequence[Float64] | Float64, normals: Float64) -> Float64:
+    """A number (n,) for what has corners (k, n, 3), in whichever order, and normals (n, 3).
+
+    Sums that are not of squares would be the same for both diagonals of a square.
+    """
+    squares = np.sort([mixed(corner) ** 2 for corner in corners], axis=0)
+    return np.asarray(squares.sum(axis=0) + mixed(normals))
+
+
+def same_cells(cells: Cells, earlier: Cells) -> tuple[Int64, Int64]:
+    """The cells (n,) that are also among earlier ones, and their numbers (n,) there."""
+    here, there = (key(c.corners.swapaxes(0, 1), c.normals) for c in (cells, earlier))
+    order = np.argsort(there)
+    at = np.minimum(np.searchsorted(there, here, sorter=order), len(there) - 1)
+    same = np.flatnonzero(there[order[at]] == here)
+    return same, order[at[same]]
