@@ -29,7 +29,8 @@ def rectangle_places(low: Float64, high: Float64, depth: Float64, unit: Float64)
     solid = angles[0] + angles[1] - rest
 
     turn = unit[0] * solid + rest
-    f = (np.cos(turn) * bottom - top) / np.sin(turn)
+    sine = np.sin(turn)
+    f = (np.cos(turn) * bottom - top) / np.where(sine == 0, 1e-30, sine)
     cosine = np.clip(np.copysign(1 / np.sqrt(f * f + bottom * bottom), f), -1 + 1e-12, 1 - 1e-12)
     x = np.clip(-cosine * z / np.sqrt(1 - cosine * cosine), x0, x1)
     far = np.sqrt(x * x + z * z)

@@ -126,6 +126,7 @@ def sampled_share(
     small gaps more often than it overrates others.
     """
     distance = np.linalg.norm(faces.centroid[p] - faces.centroid[q], axis=1)
+    distance = np.maximum(distance, np.finfo(float).tiny)  # Faces that cross may have the same centre.
     nearness = np.searchsorted([_ONE_RAY, _FOUR_RAYS], (faces.radius[p] + faces.radius[q]) / distance)
     share = np.zeros(len(p))
     rays = 0

@@ -214,3 +214,13 @@ def test_threads_give_the_same_bytes() -> None:
     one, two = (estimate(*objects, wanted=300, threads=threads) for threads in (1, 2))
     assert one.rows.weights.tobytes() == two.rows.weights.tobytes()
     assert one.rows.columns.tobytes() == two.rows.columns.tobytes()
+
+
+def test_faces_that_cross_at_their_centres():
+    """As near as can be, and no distance between them (found by the fuzzer: divided by)."""
+    corners = np.array([[-4, -1, 0], [4, -3, 0], [0, 4, 0]], dtype=float)  # and no rounding
+    flat = mesh("flat", corners, np.array([[0, 1, 2]], dtype=np.int32))
+    upright = mesh("upright", corners[:, [2, 0, 1]], np.array([[0, 1, 2]], dtype=np.int32), 1)
+    found = estimate(flat, upright, wanted=2)
+    assert np.isfinite(found.rows.weights).all()
+    assert (found.rows.row_sums() <= 1).all()

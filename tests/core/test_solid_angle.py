@@ -23,6 +23,14 @@ def test_a_face_of_a_cube_is_a_sixth_of_the_sphere():
     assert solid == pytest.approx(4 * np.pi / 6)
 
 
+def test_a_rectangle_seen_edge_on_has_no_solid_angle():
+    """From beside it and a few millionths of a millimetre off its plane (found by the fuzzer: 0 / 0)."""
+    low, high = np.array([[-1.00603057], [-0.53042016]]), np.array([[-0.48678114], [0.54764355]])
+    places, solid = rectangle_places(low, high, np.array([4.07269557e-09]), GRID)
+    assert solid == pytest.approx(0, abs=1e-7)
+    assert np.isfinite(places).all()
+
+
 @pytest.mark.parametrize(
     ("low", "high", "depth"),
     [
