@@ -13,7 +13,10 @@ All are root mean squares over the receivers' surface, relative to the mean radi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import repeat
+from typing import Any
 
 import numpy as np
 
@@ -79,14 +82,18 @@ _MISJUDGED = 0.01
 COARSENING = 3.0**0.75 - 1.0
 
 
-def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0) -> Fitted:
+def fit_halves(
+    fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0, each: Callable[..., Any] = map
+) -> Fitted:
     """Fit with the alpha at which, around each vertex, each half of the samples best predicts the other
     (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
-    a squared error of the light there counts. loose: how many times as far as usual fits may be from the best."""
-    merged = halves[0] + halves[1]
-    limits = fit.limits(merged)
-    grey = [half.grey() for half in halves]
-    systems = [fit.system(half) for half in grey]
+    a squared error of the light there counts. loose: how many times as far as usual fits may be from the best. each: a
+    `map` that may use threads."""
+    merged, to_grey = halves[0] + halves[1], halves[0].to_grey
+    limits, together = fit.limits(merged), fit.system(merged)
+    del merged  # large meshes need the room
+    grey = list(each(Samples.grey, halves))
+    systems = list(each(fit.system, grey))
     tried: list[_Halves] = []
     best = [fit.averages(system) for system in systems]
     smoother = fit.measured
@@ -94,13 +101,11 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, l
     for alpha in ALPHAS:
         # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
         rough = _ROUGH * (loose if tried else 1.0)
-        values = [
-            fit.solve(system, alpha, begin, rough, ~smoother) for system, begin in zip(systems, best, strict=True)
-        ]
+        values = list(each(fit.solve, systems, repeat(alpha), best, repeat(rough), repeat(~smoother)))
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
-        low, high = (limit @ merged.to_grey for limit in within(limits, alpha))
-        first, second = (fit.at_corners(np.clip(v[:, 0], low, high)) for v in values)
-        predicted = (grey[0].squared_residual(second) + grey[1].squared_residual(first)) / 2
+        low, high = (limit @ to_grey for limit in within(limits, alpha))
+        first, second = (np.clip(v[:, 0], low, high) for v in values)
+        predicted = sum(each(Samples.squared_residual, grey, each(fit.at_corners, (second, first)))) / 2
         if tried:
             better = np.where(fit.at_corners(smoother).all(axis=1), tried[-1].predicted - predicted, 0.0)
             smoother = smoother & (fit.nearby(area * better) > 0.0)
@@ -113,20 +118,19 @@ def fit_halves(fit: Fit, halves: list[Samples], area: Float64, shown: Float64, l
         best = [np.where(smoother[:, None], fresh, kept) for fresh, kept in zip(values, best, strict=True)]
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
-    distance = sharpest.predicted - sharpest.spread / 2.0
+    distance = sharpest.predicted - sharpest.spread(fit) / 2.0
     unseen = _unresolved(bend, distance, own_noise, area * shown)
     # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
     unseen[fit.broken] = np.maximum((distance - own_noise)[fit.broken], unseen[fit.broken])
     sampling = np.zeros_like(area)
     for number, smoothed in enumerate(tried):
         share = (own_level == number).mean(axis=1)
-        sampling += share * smoothed.spread / 4.0
-        unseen += share * smoothed.smoothed_by(sharpest)
+        sampling += share * smoothed.spread(fit) / 4.0
+        unseen += share * smoothed.smoothed_by(sharpest, fit)
     chosen = np.array(ALPHAS)[level]
-    system = fit.system(merged)
-    start = _in_colour((best[0] + best[1])[:, 0] / 2.0, fit.averages(system), merged.to_grey)
-    together = fit.solve_within(system, chosen, limits, start, loose)
-    return Fitted(chosen, together, together @ halves[0].to_grey, sampling, unseen)
+    start = _in_colour((best[0] + best[1])[:, 0] / 2.0, fit.averages(together), to_grey)
+    light = fit.solve_within(together, chosen, limits, start, loose, each)
+    return Fitted(chosen, light, light @ to_grey, sampling, unseen)
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
@@ -139,20 +143,20 @@ def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
 
 @dataclass(frozen=True, eq=False)
 class _Halves:
-    """The fits of both halves at the cells' corners (c, 3), and how well each predicts the other's samples (c,)."""
+    """The fits of both halves at the vertices (v,), and how well each predicts the other's samples (c,)."""
 
     first: Float64
     second: Float64
     predicted: Float64
 
-    @property
-    def spread(self) -> Float64:
-        return squared_mean(self.first - self.second)
+    def spread(self, fit: Fit) -> Float64:
+        """(c,) squared difference of the halves."""
+        return squared_mean(fit.at_corners(self.first - self.second))
 
-    def smoothed_by(self, sharper: _Halves) -> Float64:
+    def smoothed_by(self, sharper: _Halves, fit: Fit) -> Float64:
         """(c,) squared change from a sharper fit, unbiased: the product of what two independent halves say of it."""
         one, other = self.first - sharper.first, self.second - sharper.second
-        return (squared_mean(one + other) - squared_mean(one - other)) / 4.0
+        return (squared_mean(fit.at_corners(one + other)) - squared_mean(fit.at_corners(one - other))) / 4.0
 
 
 def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:

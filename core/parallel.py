@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from .blas import one_thread
 from .progress import Progress
@@ -41,11 +41,19 @@ class Workers:
         """function(chunk number, slice) over `count` items, results in order. Raises Cancelled between chunks."""
 
         def work(number: int) -> Result:
-            self.progress.check()
             done = function(number, slice(number * chunk, min((number + 1) * chunk, count)))
             self.progress.step()
             return done
 
-        chunks = range(-(-count // chunk))
-        # A single chunk is done sooner here than it is handed over.
-        return self._pool.map(work, chunks) if len(chunks) > 1 else map(work, chunks)
+        return self.each(work, range(-(-count // chunk)))
+
+    def each(self, function: Callable[..., Result], *items: Iterable[Any]) -> Iterator[Result]:
+        """As the built-in map, but on the threads. Raises Cancelled before an item."""
+
+        def work(arguments: tuple[Any, ...]) -> Result:
+            self.progress.check()
+            return function(*arguments)
+
+        calls = list(zip(*items, strict=False))  # some are endless repetitions
+        # A single one is done sooner here than it is handed over.
+        return self._pool.map(work, calls) if len(calls) > 1 else map(work, calls)

@@ -7,6 +7,7 @@ space and jump nowhere, so the mean of every connected surface is kept exactly.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, TypeAlias
@@ -191,22 +192,31 @@ class Fit:
         limits: tuple[Float64, Float64],
         start: Float64 | None = None,
         loose: float = 1.0,
+        each: Callable[..., Any] = map,
     ) -> Float64:
         """Vertex values (v, k) as those of `solve`, but within limits (v, k), as `limits` finds them, and filled.
 
         Beside a step of the light, the linear elements that are nearest to it overshoot on both sides. Where they do,
         the vertex is held at the limit, and the others make the best of that; the mean stays that of the samples.
-        loose: how many times as far off as those of `solve` they may be.
+        loose: how many times as far off as those of `solve` they may be. each: a `map` over the channels that may use
+        threads.
         """
-        matrix = self.matrix(system, alpha)
-        accuracy = loose * _TOLERANCE, _MAXIMUM_ITERATIONS
+        matrix, every = self.matrix(system, alpha), np.arange(system.target.shape[1])[:, None]
+
+        def solved(start: Float64, held: Bool) -> Float64:
+            def of_channel(k: np.ndarray) -> Float64:
+                target = system.target[:, k], start[:, k]
+                return conjugate_gradients(matrix, *target, loose * _TOLERANCE, _MAXIMUM_ITERATIONS, held[:, k])
+
+            return np.concatenate(list(each(of_channel, every)), axis=1)
+
         start = self.averages(system) if start is None else start
-        free = conjugate_gradients(matrix, system.target, start, *accuracy)
+        free = solved(start, np.zeros(start.shape, dtype=bool))
         low, high = within(limits, alpha)
         values = np.clip(free, low, high)
         held = values != free
         if held.any():
-            freer = conjugate_gradients(matrix, system.target, values, *accuracy, held)
+            freer = solved(values, held)
             values = np.clip(freer, low, high)
             pressed = np.where(held, matrix @ freer - system.target, 0.0)
             added = np.asarray(pressed + system.lumped[:, None] * (values - freer), dtype=np.float64)
@@ -253,16 +263,18 @@ class Fit:
         1 / sqrt(n) of the triangle's size, so light may go on rising or falling by twice that share of what it does
         among them; but not where the other side is out of sight.
         """
-        shape = (samples.low.shape[1], self._count)
-        low, high = np.full(shape, np.inf), np.full(shape, -np.inf)
+        # Sorted once for all channels: ten times as fast as minimum.at.
+        vertex = self._corner.ravel()
+        order = np.argsort(vertex, kind="stable")
+        first = np.flatnonzero(np.diff(vertex[order], prepend=-1))
+        met, cell = vertex[order[first]], order // 3
+        low, high = np.full((2, samples.low.shape[1], self._count), np.inf)
+        for k in range(len(low)):
+            low[k, met] = np.minimum.reduceat(samples.low[cell, k], first)
+            high[k, met] = np.maximum.reduceat(samples.high[cell, k], first)
         cut_off = np.zeros(self._count, dtype=bool)
         for corner in self._corner.T:
-            # Numbers in one piece, channel by channel: so numpy is ten times as fast.
-            numbers = np.ascontiguousarray(corner)
-            for k in range(len(low)):
-                np.minimum.at(low[k], numbers, samples.low[:, k])
-                np.maximum.at(high[k], numbers, samples.high[:, k])
-            cut_off[numbers[samples.tried > samples.count]] = True
+            cut_off[corner[samples.tried > samples.count]] = True
         low, high = (np.where(np.isfinite(limit), limit, 0.0).T for limit in (low, high))
         samples_around = self._scatter(np.repeat(samples.count[:, None], 3, axis=1))
         share = np.where(self._surrounded | cut_off, 0.0, 2.0 / np.sqrt(np.maximum(samples_around, 4.0)))

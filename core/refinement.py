@@ -163,9 +163,8 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
     in_sight = area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
-    fits = list(
-        workers.map(lambda number, _: fit_halves(fit, sampled[number], in_sight, shown, loose), len(sampled), 1)
-    )
+    # One after the other, each on all threads: both at once would need twice the memory.
+    fits = [fit_halves(fit, halves, in_sight, shown, loose, workers.each) for halves in sampled]
     reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
     emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
     return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)
