@@ -324,9 +324,12 @@ class Survey:
         Of a triangle that is seen in part all samples may happen to be hidden, so it is looked at where that part would
         be.
         """
-        chosen = np.flatnonzero(self.invalid & (self.valid_samples == 0))
-        around = self._glance
+        element, around = self.receivers.cells.element, self._glance
+        hidden = self.invalid & (self.valid_samples == 0)
+        buried = np.ones(len(self.receivers.element_corners), dtype=bool)
+        buried[element[~hidden]] = False
         for k, weights in enumerate(_BESIDES):
+            chosen = np.flatnonzero(buried[element])
             if around is None or not len(chosen):
                 break
             points = Points(self.receivers.cells, chosen, np.broadcast_to(weights, (len(chosen), 3)))
@@ -334,11 +337,8 @@ class Survey:
             arriving, enclosed, rays = around.look(points, self.seed, 3_000_000 + k, self.workers)
             self.rays += rays
             direct = light.grey
-            chosen = chosen[enclosed & dark(arriving + direct, direct, self._mean)]
-        element = self.receivers.cells.element
-        seen = np.ones(len(element), dtype=bool)
-        seen[chosen] = False
-        return np.asarray(np.bincount(element, seen, len(self.receivers.element_corners)) == 0)
+            buried[element[chosen[~(enclosed & dark(arriving + direct, direct, self._mean))]]] = False
+        return buried
 
     def _uncertain(self) -> Bool:
         """Cells (c,) that a shadow boundary crosses, and whose direct light varies by more than their fair share of the
