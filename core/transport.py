@@ -142,8 +142,9 @@ def solve_halves(
     workers: Workers,
     seed: int,
 ) -> tuple[Transport, ...]:
-    """Two independent solutions, each with rays of its own; none when the plan has nothing for rays to look for."""
-    if not plan.looks_around:
+    """Two independent solutions, each with rays of its own; none when the plan has nothing for rays to look for, or
+    nothing is there at which one would stop."""
+    if not plan.looks_around or (patches.coverage is not None and not patches.coverage.any()):
         return ()
     if not plan.active("bounces"):
         patches = replace(patches, albedo=np.zeros_like(patches.albedo), transmission=None)

@@ -90,6 +90,14 @@ def test_tints_over_one_make_no_light(build):
         assert energy["absorbed"] > 0
 
 
+@pytest.mark.parametrize("sky", [NONE, ALL])
+def test_nothing_but_air_is_black(build, sky):
+    """Where no ray stops anywhere nothing is exchanged (found by the fuzzer: rows of no sides)."""
+    air = Surface("air", HALF, opacity=0.0)
+    result = bake(Scene((build.box("box"),), (air,), (PointLamp("bulb", (2, 2, 2), ALL),), sky), QUICK)
+    assert result.objects[0].layers["combined"].max() == 0
+
+
 def test_three_shares_of_three_colours(build):
     """A ball that reflects red, mirrors green and lets blue through absorbs nothing: its own red light is that of the
     furnace, 2. Seen to fail: no ray that stops."""

@@ -20,6 +20,7 @@ import pytest
 from radiosity_baker.addon.bake_scene import bake_objects
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.closed_forms import KnownLight
+from radiosity_baker.core.form_factors.polygon import polygon_irradiance
 from radiosity_baker.core.patches import triangle_geometry
 from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SceneObject, SunLamp, Surface
@@ -364,6 +365,19 @@ def around(width: float, depth: float) -> list[SceneObject]:
     ]
 
 
+def under_a_glowing_panel(gap: float) -> KnownLight:
+    """A floor, all that is not black, under a panel that glows, so far below the ceiling."""
+    outline = np.array([(0.2, 0.2, 1.0), (0.8, 0.2, 1.0), (0.8, 0.8, 1.0), (0.2, 0.8, 1.0)])
+    x = (np.arange(50) + 0.5) / 50
+    points = np.stack([*np.meshgrid(x, x), np.zeros((50, 50))], axis=-1).reshape(-1, 3)
+    factor = polygon_irradiance(points, np.tile([0.0, 0.0, 1.0], (len(points), 1)), outline, two_sided=True).mean()
+    panel = quad("panel", tuple(outline[0]), (0, 0.6, 0), (0.6, 0, 0), surface=2)
+    ceiling = quad("ceiling", (-1, -1, 1 + gap), (0, 3, 0), (3, 0, 0), surface=1)
+    objects = (FLOOR, *(replace(o, receives=False) for o in (panel, ceiling)))
+    surfaces = (WHITE, BLACK, Surface("lamp", (0.0,) * 3, (2.0,) * 3))
+    return KnownLight("", Scene(objects, surfaces), lambda p: np.full(len(p), factor), 0.0, 0.1, True)
+
+
 SHADED: dict[str, tuple[Callable[[], KnownLight], str]] = {
     "blocker smaller than a patch": (
         lambda: shaded(1 - 0.03**2, quad("dot", (0.31, 0.42, 0.5), (0.03, 0, 0), (0, 0.03, 0))),
@@ -382,6 +396,8 @@ SHADED: dict[str, tuple[Callable[[], KnownLight], str]] = {
     ),
     "pinhole": (lambda: shaded(0.05**2, *around(0.05, 0.05)), "a spot of sun that no sample has found"),
     "crack of a door": (lambda: shaded(0.01, *around(0.01, 1.0)), "light narrower than a triangle"),
+    "light plane in the plane of the ceiling": (lambda: under_a_glowing_panel(0.0), "lamps behind what they lie on"),
+    "light plane a hair below the ceiling": (lambda: under_a_glowing_panel(1e-6), "the same"),
     "floor in full shade": (lambda: shaded(0.0, quad("roof", (-5, -5, 0.1), (11, 0, 0), (0, 11, 0))), "leaks"),
 }
 

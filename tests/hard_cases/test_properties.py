@@ -249,6 +249,7 @@ class Stages:
         self.scene = check_scene(scene)
         self.space = unit_space(self.scene)
         self.patches = make_patches(self.scene, self.space, split_objects(self.scene, 40))
+        assume(self.patches.coverage is None or self.patches.coverage.any())  # or nothing is exchanged
         self.visibility = Visibility(self.patches.corners, self.patches.optics)
         estimator = "hemisphere" if goes_on(scene) else estimator
         self.effort = replace(
