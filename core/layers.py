@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import cached_property
 
 import numpy as np
 
+from .diagonals import turn_diagonals
 from .receivers import Receivers
 from .refinement import Light
 from .result import BakedObject
 from .scene import Float32, Float64, Scene, SceneError
 from .settings import LAYERS
+from .tessellation import Int64
 from .textured_fit import TexturedFit
 from .textures import constant_colours, varies
 
@@ -28,12 +31,16 @@ def baked_objects(receivers: Receivers, layers: Layers, names: tuple[str, ...]) 
     values = {name: layers.values(name) for name in names}
     for number, (receiver, mesh) in enumerate(zip(receivers.objects, receivers.meshes, strict=True)):
         part = slice(receivers.first[number], receivers.first[number + 1])
+        triangles, barycentric = mesh.triangles, mesh.barycentric
+        if layers.corners is not None:
+            own = layers.corners[part] - 3 * receivers.first[number]
+            triangles, barycentric = triangles.ravel()[own], barycentric.reshape(-1, 3)[own]
         yield BakedObject(
             receiver.name,
             mesh.vertices,
-            mesh.triangles,
+            triangles,
             mesh.parent,
-            mesh.barycentric,
+            barycentric,
             {name: layer[part] for name, layer in values.items()},
         )
 
@@ -49,6 +56,17 @@ class Layers:
         self._straight = light.lamps + light.emitted + light.sky
         self._colours = constant_colours(scene, receivers.element_surface)
         self._textured = TexturedFit(scene, receivers) if any(varies(scene, o) for o in receivers.objects) else None
+
+    @cached_property
+    def corners(self) -> Int64 | None:
+        """(e, 3) the corner that each corner of the output triangles becomes when diagonals are turned; None where all
+        stay: in meshes that are kept, and in light that is still rough. Textures were fitted to triangles as they are.
+        """
+        if not (self._receivers.tessellated and self._light.alphas):
+            return None
+        everything = (self._straight + self._light.reflected).mean(axis=1)
+        textured = False if self._textured is None else self._textured.elements
+        return turn_diagonals(self._receivers, everything, self._light.buried | textured)
 
     def values(self, name: str) -> Float32:
         """One layer (e, 3, 3) over all output triangles, as settings.LAYERS describes it: radiance in W/(m^2 sr), or a
@@ -69,7 +87,10 @@ class Layers:
         }
         if name not in layers:
             raise SceneError(f"There is no layer '{name}': choose from {', '.join(LAYERS)}.")
-        return np.ascontiguousarray(layers[name](), dtype=np.float32)
+        values = layers[name]()
+        if self.corners is not None and name != "triangles":
+            values = values.reshape(-1, 3)[self.corners]
+        return np.ascontiguousarray(values, dtype=np.float32)
 
     def _shown(self, irradiance: Float64, *, emits: bool = False) -> Float64:
         """What (e, 3, 3) the surfaces make of the irradiance (v, 3) at the vertices, with or without what they emit."""

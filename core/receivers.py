@@ -89,6 +89,22 @@ class Receivers:
         return np.asarray(values[self.corner_vertex[self.cells.element]].mean(axis=1))
 
     @cached_property
+    def broken(self) -> Bool:
+        """(c,) cells with a corner where the fit breaks along a contour."""
+        if self.breaks is None:
+            return np.zeros(len(self.cells), dtype=bool)
+        ends = self.breaks | np.roll(self.breaks, 1, axis=1)
+        at_break = np.zeros(self.vertices, dtype=bool)
+        at_break[self.corner_vertex[ends]] = True
+        return np.asarray(at_break[self.corner_vertex[self.cells.element]].any(axis=1))
+
+    @property
+    def parent(self) -> Int64:
+        """(e,) the input's triangle that each output triangle is part of, counted over all receivers."""
+        begin = np.cumsum([0, *(len(o.triangles) for o in self.objects[:-1])])
+        return np.concatenate([m.parent + b for m, b in zip(self.meshes, begin, strict=True)])
+
+    @cached_property
     def cell_vertex(self) -> Int32:
         """(c, 3) the mesh vertex of each corner of the cells, counted over all receivers."""
         return _numbered(self.fine)

@@ -131,7 +131,7 @@ class Fit:
     lumped (c, 3): how much the valid samples weigh at each corner; where that is next to nothing the fit has nothing to
     say, and `fill` does. hidden (c,): cells of which some sample was out of sight. Of the vertices (v,), those that no
     valid sample tells of are not `measured`; they are `filled` when they share an edge with one that is, since what is
-    seen reaches there. broken (c,): cells with a corner where the fit breaks along a contour.
+    seen reaches there. broken (c,): as Receivers.broken.
     """
 
     def __init__(self, receivers: Receivers, lumped: Float64, hidden: Bool) -> None:
@@ -141,7 +141,7 @@ class Fit:
         self.measured = self._scatter(lumped) > _MEASURED
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
         self._edge, self._edge_ends = numbered_edges(receivers.corner_vertex)
-        self.broken = self._at_breaks(receivers)
+        self.broken = receivers.broken
         self._both_known = self.measured[self._edge_ends].all(axis=1)
         self.filled = ~self.measured & self._beside_measured()
         jumps = gradient_jumps(receivers, self.measured)
@@ -345,14 +345,6 @@ class Fit:
             known = known | fresh | self.hidden
             edge = fresh[one] & ~known[two]
         return values
-
-    def _at_breaks(self, receivers: Receivers) -> Bool:
-        if receivers.breaks is None:
-            return np.zeros(len(receivers.cells), dtype=bool)
-        ends = receivers.breaks | np.roll(receivers.breaks, 1, axis=1)
-        at_break = np.zeros(self._count, dtype=bool)
-        at_break[receivers.corner_vertex[ends]] = True
-        return np.asarray(at_break[self._corner].any(axis=1))
 
     def _neighbours(self) -> tuple[Int32, Int32]:
         """Both ends of all edges, each edge both ways."""
