@@ -332,6 +332,8 @@ class Contours:
         with an outline between them, or with something that stands between them."""
         here, there = shared_edges(receivers.cell_vertex)
         both = near[here[:, 0] // 3] & near[there[:, 0] // 3]
+        if not both.any():
+            return np.zeros((len(near), 3), dtype=bool)
         side = np.concatenate([here[both, 0], _side(there[both])])
         weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
         weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE

@@ -350,6 +350,22 @@ def test_edges_without_length_are_not_cut():
     assert light.min() >= 0
 
 
+def test_shadows_among_faces_that_share_no_side():
+    """Faces that cross and overlap, none of which goes on in another where light breaks (found by the fuzzer: looks
+    around from no points)."""
+    x, y = (0.13640898, -0.02608042, 0.20787593), (-0.10270972, 0.20787593, 0.09347893)
+    z = (0.36520298, 0.27281795, -0.20541944)
+    block = box("block").vertices @ np.array([z, y, x]) + (0.0, 0.25, 0.5)
+    faces = [[0, 1, 2], [0, 1, 3], [1, 1, 2], [2, 1, 0], [0, 1, 2]]
+    broken = triangles("broken", [(0, 0, 0.5), (1, 0, 0.5), (0, 1, 0.5), (2, 0, 0.5), (9, 9, 9.5)], faces)
+    scene = Scene((replace(box("block"), vertices=block), broken), (WHITE,))
+    settings = Settings(triangles=30, error=None)
+    effort = replace(
+        choose_effort(scene, settings), patches=30, triangles=30, growth=0.3, transport_rays=16, gather_rays=8
+    )
+    assert corners_of(bake(scene, settings, effort=effort))[1].max() == 0
+
+
 def ball_of_rays(count: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(0)
     ways = rng.normal(size=(count, 3)).astype(np.float32)
