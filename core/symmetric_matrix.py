@@ -17,8 +17,8 @@ class SymmetricPattern:
     """Where a symmetric matrix has entries: on its diagonal, and at (i, j) and (j, i) for each pair (m, 2).
 
     A pair that is named twice counts twice. Found once, it serves every set of values. The rows lie in blocks of nearly
-    equal length, the longest first: rows (r,), and for each place (w, r) the column of its entry and the pair that it
-    has its value from. Places that no pair fills take a value behind the last pair's, which is zero.
+    equal length, the longest first; blocks: for each place (w, r) of their entries the column, and the pair that holds
+    the value. Places that no pair fills take one behind the last pair's, which is zero. rank (n,): where a row lies.
     """
 
     def __init__(self, count: int, pairs: Int64) -> None:
@@ -28,13 +28,14 @@ class SymmetricPattern:
         column, pair = np.append(column[order], 0), np.append(order % max(len(pairs), 1), len(pairs))
         length = np.bincount(row, minlength=count)
         first = np.cumsum(length) - length
-        longest = np.argsort(-length, kind="stable")[: np.count_nonzero(length)]
-        self.blocks: list[tuple[Int64, Int64, Int64]] = []
+        longest = np.argsort(-length, kind="stable")
+        self.rank = np.argsort(longest)
+        self.blocks: list[tuple[Int64, Int64]] = []
         while len(longest):
             places = np.arange(length[longest[0]])[:, None]
-            rows, longest = np.split(longest, [max(_BLOCK // len(places), 1)])
+            rows, longest = np.split(longest, [max(_BLOCK // max(len(places), 1), 1)])
             entry = np.where(places < length[rows], first[rows] + places, len(order))
-            self.blocks.append((rows, column[entry], pair[entry]))
+            self.blocks.append((column[entry], pair[entry]))
 
 
 class SymmetricMatrix:
@@ -42,21 +43,24 @@ class SymmetricMatrix:
 
     def __init__(self, pattern: SymmetricPattern, diagonal: Float64, values: Float64) -> None:
         self.diagonal = diagonal
+        self._rank = pattern.rank
         values = np.append(values, 0.0)
-        self._blocks = [(rows, columns, values[pair]) for rows, columns, pair in pattern.blocks]
+        self._blocks = [(columns, values[pair]) for columns, pair in pattern.blocks]
 
     def __matmul__(self, x: Float64) -> Float64:
         """(n, k) to (n, k)."""
         channels = np.ascontiguousarray(x.T)
-        product = self.diagonal * channels
-        terms = np.empty(max((columns.size for _, columns, _ in self._blocks), default=0))
-        for rows, columns, values in self._blocks:
+        sums = np.empty_like(channels)
+        terms = np.empty(max((columns.size for columns, _ in self._blocks), default=0))
+        end = 0
+        for columns, values in self._blocks:
+            begin, end = end, end + columns.shape[1]
             taken = terms[: columns.size].reshape(columns.shape)
-            for channel, image in zip(channels, product, strict=True):
+            for channel, row_sums in zip(channels, sums, strict=True):
                 # Clipping never happens; it only spares numpy a copy of what it takes.
                 np.take(channel, columns, out=taken, mode="clip")
-                image[rows] += np.einsum("wr,wr->r", values, taken)
-        return product.T
+                np.einsum("wr,wr->r", values, taken, out=row_sums[begin:end])
+        return np.asarray((self.diagonal * channels + np.take(sums, self._rank, axis=1)).T)
 
 
 def conjugate_gradients(

@@ -90,10 +90,10 @@ def bake_once(
     name: str, label: str, settings: Settings, reference: Reference | None, effort: Effort | None = None
 ) -> Baked:
     """Build the scene anew and bake it, from Blender's meshes to Blender's attributes. Without a reference no error is
-    known. Where settings keep the meshes, these are as fine as settings.triangles."""
+    known, and meshes that settings keep have as nearly settings.triangles as they can; else within a factor of two."""
     objects = build(name)
     if not settings.tessellate:
-        subdivide(objects, settings.triangles)
+        subdivide(objects, settings.triangles, nearly=reference is None)
     scene, sources = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=settings.tessellate)
     planned = plan(scene, settings, effort)
     with _embree() as inside:

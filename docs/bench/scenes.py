@@ -5,6 +5,7 @@ Lengths are metres, lamps watts. Each function starts from an empty file and ret
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
 from math import radians
@@ -217,12 +218,14 @@ def _nodes(owner: bpy.types.Material | bpy.types.World) -> bpy.types.NodeTree:
     return owner.node_tree
 
 
-def subdivide(objects: Objects, triangles: int) -> None:
+def subdivide(objects: Objects, triangles: int, *, nearly: bool = False) -> None:
     """Split the objects' own meshes into about `triangles` triangles of one size: what an artist brings who models
-    finely, and wants to keep."""
+    finely, and wants to keep. nearly: not within a factor of two, but as near as an edge for all of them gets."""
     cut = [_triangles(obj.data) for obj in objects]
     vertices, corners = [whole.vertices for whole, _ in cut], [whole.triangles for whole, _ in cut]
     edge = edge_for_count(vertices, corners, triangles)
+    if nearly:
+        edge = _nearest_edge([whole for whole, _ in cut], edge, triangles)
     for obj, (coarse, material) in zip(objects, cut, strict=True):
         fine = triform(coarse, edge)
         mesh = bpy.data.meshes.new(obj.data.name)
@@ -239,6 +242,20 @@ def subdivide(objects: Objects, triangles: int) -> None:
         if not obj.data.polygons[0].use_smooth:
             mesh.shade_flat()
         obj.data = mesh
+
+
+def _nearest_edge(meshes: list[Tessellation], edge: float, triangles: int) -> float:
+    """Of lengths around `edge` that at which the meshes split into most nearly `triangles` triangles."""
+    lengths = edge * np.geomspace(0.4, 2.5, 65)
+    counts: dict[int, int] = {}
+
+    def count(k: int) -> int:
+        if k not in counts:
+            counts[k] = sum(len(triform(mesh, float(lengths[k])).triangles) for mesh in meshes)
+        return counts[k]
+
+    bisect_left(range(len(lengths)), -triangles, key=lambda k: -count(k))  # it counts on both sides of the nearest
+    return float(lengths[min(counts, key=lambda k: abs(np.log(counts[k] / triangles)))])
 
 
 def _triangles(mesh: bpy.types.Mesh) -> tuple[Tessellation, NDArray[np.int32]]:
