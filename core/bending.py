@@ -88,7 +88,10 @@ class Bends:
         found = fit_samples(survey, scene, self._workers)
         direct, *indirect = (fitted.resolution for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
-        pieces = found.area * found.shown * sum((_blurred(error, survey.receivers) for error in indirect), direct)
+        errors = [direct, *(_blurred(error, survey.receivers) for error in indirect)]
+        weight = found.area * found.shown
+        # What is below zero as a whole is noise, and must not make up for an error of the other.
+        pieces = weight * sum(error * (weight @ error > 0.0) for error in errors)
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
@@ -96,10 +99,12 @@ class Bends:
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
         large = cells.area > _SMALLEST * cells.area.sum() / limit
         chosen = np.zeros(len(cells), dtype=bool)
-        kept = _KEPT * max(squared.sum(), 0.0)
-        chosen[until_allowed(squared, max((allowed - kept) / (1.0 - _KEPT), allowed / 2.0), limit - len(source))] = True
+        total = float(np.maximum(squared, 0.0).sum())
+        # What is split adds to what is left; where it alone is more than is allowed, there will be another round.
+        uncut = max((allowed - _KEPT * total) / (1.0 - _KEPT), allowed / 2.0)
+        chosen[until_allowed(squared, uncut, limit - len(source))] = True
         chosen &= large
-        return chosen, bool(squared.sum() - (1.0 - _KEPT) * squared[chosen].sum() <= allowed)
+        return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed)
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for
