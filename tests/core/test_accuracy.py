@@ -13,7 +13,9 @@ from radiosity_baker.core.accuracy import (
     fit_halves,
     squared_mean,
 )
+from radiosity_baker.core.parallel import Workers
 from radiosity_baker.core.patches import coarser_groups, unit_space
+from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.reconstruction import Fit, Samples
 from radiosity_baker.core.sampling import plane_points, triangle_points
@@ -168,3 +170,20 @@ def test_coarser_groups_blur_as_squares_of_four_patches(build):
     between = np.sum(made.patch_area[:, None] * (center - middle[group]) ** 2)
     within = np.sum(made.patch_area**2 * 2 / 9)
     assert 2.0 < (between + within) / within < 4.0
+
+
+def test_a_loose_fit_is_off_by_no_more_than_it_may_and_threads_change_nothing(build):
+    """What is left of the system, scaled by its diagonal, is more than a close fit leaves, and ten times that at most."""
+    scene = Scene((build.quad(),), (build.grey,))
+    floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
+    rng, every = np.random.default_rng(7), np.zeros(len(floor.cells), bool)
+    halves = [sample(floor, lambda points: 2.0 + points[:, 0], 2, rng, noise=0.3) for _ in range(2)]
+    fit, area = Fit(floor, halves[0].lumped, every), floor.cells.area
+    with Workers(2, Progress()) as workers:
+        loose, threaded = (fit_halves(fit, halves, area, np.ones(len(area)), 10.0, e) for e in (map, workers.each))
+    assert loose.values.tobytes() == threaded.values.tobytes()
+    system = fit.system(halves[0] + halves[1])
+    matrix = fit.matrix(system, loose.alpha)
+    left = system.target - matrix @ loose.values
+    ratio = np.sqrt(np.sum(left**2 / matrix.diagonal[:, None]) / np.sum(system.target**2 / matrix.diagonal[:, None]))
+    assert 5e-4 < ratio < 5e-3

@@ -116,6 +116,17 @@ def test_the_mean_of_the_samples_is_kept(floor, alpha):
 
 
 @pytest.mark.usefixtures("exactly")
+def test_what_is_held_stays_and_the_rest_makes_the_best_of_it(floor):
+    samples = sample(floor, noise)
+    fit = fit_of(floor, samples.lumped)
+    system, held = fit.system(samples), np.arange(floor.vertices) % 3 == 0
+    start = fit.averages(system)
+    values = fit.solve(system, 5.0, start, held=held)
+    assert (values[held] == start[held]).all()
+    assert (fit.matrix(system, 5.0) @ values)[~held] == pytest.approx(system.target[~held], abs=1e-9)
+
+
+@pytest.mark.usefixtures("exactly")
 def test_without_smoothing_no_other_values_are_nearer_to_the_samples(floor):
     samples = sample(floor, noise).grey()
     fit = fit_of(floor, samples.lumped)
