@@ -109,8 +109,9 @@ class Patches:
 
 def unit_space(scene: Scene) -> Space:
     """The smallest cube around all objects, blown up by nothing: its half edge becomes one."""
-    low = np.min([o.vertices[o.triangles].min(axis=(0, 1)) for o in scene.objects], axis=0)
-    high = np.max([o.vertices[o.triangles].max(axis=(0, 1)) for o in scene.objects], axis=0)
+    used = [o.vertices[np.bincount(o.triangles.ravel(), minlength=len(o.vertices)) > 0] for o in scene.objects]
+    low = np.min([vertices.min(axis=0) for vertices in used], axis=0)
+    high = np.max([vertices.max(axis=0) for vertices in used], axis=0)
     return Space((low + high) / 2, max(float((high - low).max()) / 2, 1e-30))
 
 

@@ -173,7 +173,7 @@ def test_coarser_groups_blur_as_squares_of_four_patches(build):
 
 
 def test_a_loose_fit_is_off_by_no_more_than_it_may_and_threads_change_nothing(build):
-    """What is left of the system, scaled by its diagonal, is more than a close fit leaves, and ten times that at most."""
+    """What is left of the scaled system is more than a close fit leaves, and at most ten times that."""
     scene = Scene((build.quad(),), (build.grey,))
     floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
     rng, every = np.random.default_rng(7), np.zeros(len(floor.cells), bool)
