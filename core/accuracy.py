@@ -107,6 +107,7 @@ def fit_halves(
         first, second = (np.clip(v[:, 0], low, high) for v in values)
         predicted = sum(each(Samples.squared_residual, grey, each(fit.at_corners, (second, first)))) / 2
         if tried:
+            # Cells beside a fit that stayed, which holds them back, have no say.
             better = np.where(fit.at_corners(smoother).all(axis=1), tried[-1].predicted - predicted, 0.0)
             smoother = smoother & (fit.nearby(area * better) > 0.0)
             if smoother.sum() <= _FEW * len(smoother):

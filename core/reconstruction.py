@@ -205,8 +205,8 @@ class Fit:
 
         def solved(start: Float64, held: Bool) -> Float64:
             def of_channel(k: np.ndarray) -> Float64:
-                target = system.target[:, k], start[:, k]
-                return conjugate_gradients(matrix, *target, loose * _TOLERANCE, _MAXIMUM_ITERATIONS, held[:, k])
+                accuracy = loose * _TOLERANCE, _MAXIMUM_ITERATIONS
+                return conjugate_gradients(matrix, system.target[:, k], start[:, k], *accuracy, held[:, k])
 
             return np.concatenate(list(each(of_channel, every)), axis=1)
 
