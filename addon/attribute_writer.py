@@ -27,6 +27,8 @@ ResultMode = Literal["new", "replace", "keep"]
 OURS_KEY = "radiosity_baker"
 #: The light itself, corner by corner.
 FLOATS = Storage()
+#: Bytes that Blender keeps of an attribute's name; to a longer one it gives no attribute.
+_LONGEST_NAME = 67
 #: How long the originals are read before Blender may draw.
 _READING_SECONDS = 0.02
 
@@ -43,6 +45,9 @@ def check_writable(
     names = [attribute_name(attribute, layer) for layer in layers]
     if not attribute:
         raise SceneError("The attribute has no name: give it one, for example 'Radiosity'.")
+    longest = max(names, key=lambda name: len(name.encode()))
+    if len(longest.encode()) > _LONGEST_NAME:
+        raise SceneError(f"'{longest}' is too long a name for an attribute: choose a shorter one than '{attribute}'.")
     for obj in objects:
         _check_names(obj, names)
         if result_mode != "new":

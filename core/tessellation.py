@@ -176,7 +176,12 @@ def edge_for_count(vertices: list[Float64], triangles: list[Int32], wanted: int)
     crosses = bisect_left(sizes, -float(wanted), key=lambda k: -measures.full_sized(candidates[k]))
     beside = [k for k in (crosses - 1, crosses) if k in sizes]
     counts = {k: measures.full_sized(candidates[k]) for k in beside}
-    return float(candidates[min(beside, key=lambda k: abs(np.log(counts[k] / wanted)))])
+    best = min(beside, key=lambda k: abs(np.log(counts[k] / wanted)))
+    edge, count = float(candidates[best]), counts[best]
+    while count > 4 * wanted:  # Needles: by its area alone one of 1e20 to 1 would be cut into ten thousand million.
+        edge *= 2.0
+        count = measures.full_sized(edge)
+    return edge
 
 
 def predicted_count(vertices: list[Float64], triangles: list[Int32], longest_edge: float) -> int:

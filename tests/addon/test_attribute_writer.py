@@ -453,6 +453,15 @@ def test_a_nameless_attribute_is_refused(cube):
     refused([cube], "keep", "has no name", attribute="")
 
 
+@pytest.mark.parametrize("attribute", ["x" * 68, "\u65e5" * 23])
+def test_a_name_that_blender_cannot_keep_is_refused(cube, attribute):
+    """It would give no attribute at all. Seen to fail: an error in the middle of writing."""
+    assert cube.data.color_attributes.new(attribute, "FLOAT_COLOR", "CORNER") is None or (
+        attribute not in cube.data.color_attributes
+    )
+    refused([cube], "keep", "too long", attribute=attribute)
+
+
 def test_a_mesh_edited_during_the_bake_is_refused_and_nothing_is_left_behind(cube, add_mesh, bake):
     edited = add_mesh("Edited")
 

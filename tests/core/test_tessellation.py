@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radiosity_baker.core.patches import triangle_geometry
+from radiosity_baker.core.shapes import box
 from radiosity_baker.core.tessellation import (
     Tessellation,
     edge_for_count,
@@ -156,3 +157,13 @@ def test_a_mesh_denser_than_wanted_is_left_alone(build):
     ball = build.sphere(level=4)
     size = edge_for_count([ball.vertices], [ball.triangles], 100)
     assert len(triform(whole(ball.vertices, ball.triangles), size).triangles) == len(ball.triangles)
+
+
+def test_a_vertex_astray_does_not_take_all_memory():
+    """A box of which one corner lies 1e20 times its size away, as broken files have it: a few times as many triangles
+    as asked for. Seen to fail: an edge by the area alone, at which needles split without end."""
+    body = box("box")
+    vertices = np.array(body.vertices, dtype=float)
+    vertices[0] = (1e20, 0.0, 0.0)
+    edge = edge_for_count([vertices], [body.triangles], 500)
+    assert predicted_count([vertices], [body.triangles], edge) <= 2000
