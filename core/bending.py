@@ -15,7 +15,6 @@ from .contours import Contours
 from .direct.illumination import DirectLight
 from .gather import Points
 from .parallel import Workers
-from .patches import Cells
 from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
 from .refinement import fit_samples
@@ -62,7 +61,10 @@ class Bends:
         for number in range(BEND_ROUNDS):
             trial, source = self._contours.cut(receivers)
             survey = self._surveyed(trial, number, survey)
-            chosen, enough = self._worst(scene, survey, receivers.cells, source, limit)
+            # The errors of small cells are known better: some room is left for those of later rounds.
+            room = (limit - len(source)) // (1 if number == BEND_ROUNDS - 1 else 2)
+            large = receivers.cells.area > _SMALLEST * receivers.cells.area.sum() / limit
+            chosen, enough = self._worst(scene, survey, source, large, room)
             if not chosen.any():
                 return trial
             receivers = split_cells(receivers, chosen)[0]
@@ -82,9 +84,10 @@ class Bends:
         self.rays += survey.rays
         return survey
 
-    def _worst(self, scene: Scene, survey: Survey, cells: Cells, source: Int64, limit: int) -> tuple[Bool, bool]:
-        """The cells (c,) of the largest squared error, so many that what is left is allowed, while there is room; and
-        whether it will be once they are split, so that nobody need look again."""
+    def _worst(self, scene: Scene, survey: Survey, source: Int64, large: Bool, room: int) -> tuple[Bool, bool]:
+        """Of the large (c,) cells, from which those of the survey come, the ones with the largest squared error, so
+        many that what is left is allowed, while there is room; and whether it will be once they are split, so that
+        nobody need look again."""
         found = fit_samples(survey, scene, self._workers)
         direct, *indirect = (fitted.resolution for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
@@ -95,14 +98,13 @@ class Bends:
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
-        squared = np.bincount(source, pieces, len(cells)).astype(np.float64)
-        allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(cells.area.sum())
-        large = cells.area > _SMALLEST * cells.area.sum() / limit
-        chosen = np.zeros(len(cells), dtype=bool)
+        squared = np.bincount(source, pieces, len(large)).astype(np.float64)
+        allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(survey.receivers.cells.area.sum())
+        chosen = np.zeros(len(large), dtype=bool)
         total = float(np.maximum(squared, 0.0).sum())
         # What is split adds to what is left; where it alone is more than is allowed, there will be another round.
         uncut = max((allowed - _KEPT * total) / (1.0 - _KEPT), allowed / 2.0)
-        chosen[until_allowed(squared, uncut, limit - len(source))] = True
+        chosen[until_allowed(squared, uncut, room)] = True
         chosen &= large
         return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed)
 
