@@ -23,14 +23,14 @@ from .scene import SceneError
 _CALIBRATION = 1 << 13
 #: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers, of one that
 #: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
-_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 1000.0
+_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 600.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 50.0, 900.0, 1500.0, 3300.0, 4000.0, 1300.0
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 50.0, 600.0, 1500.0, 3300.0, 4000.0, 1300.0
 #: Of any bake, however small, and of any round of finding where light bends.
 _FIXED, _ROUND = 1.5e7, 1.2e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
-_CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2500.0, 13_000.0, 600.0
+_CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2000.0, 13_000.0, 600.0
 
 
 @dataclass(frozen=True)
