@@ -487,6 +487,11 @@ SENTENCES |= {
     "Objekt mit Flächen ist gewählt. Ein Netzobjekt wählen und erneut backen.",
     "Nothing to bake: the faces of {names} have no area. Check its scale, or delete them.": "Nichts zu backen: die "
     "Flächen von {names} haben keinen Inhalt. Skalierung prüfen, oder sie löschen.",
+    "'{name}' is too long a name for an attribute: choose a shorter one than '{attribute}'.": "'{name}' ist als Name "
+    "eines Attributs zu lang: einen kürzeren als '{attribute}' wählen.",
+    "'{name}' is lost in a scene of {extent} m, where nothing so small can be told apart: move '{far}' nearer, or "
+    "delete its vertices that are far away.": "'{name}' geht in einer Szene von {extent} m verloren, in der nichts so "
+    "Kleines zu unterscheiden ist: '{far}' näher heranrücken oder dessen weit entfernte Eckpunkte löschen.",
     "Scene '{name}' has no mesh object that is visible to rendering: add one, or switch its camera icon on in the "
     "Outliner.": "Szene '{name}' hat kein Netzobjekt, das beim Rendern sichtbar ist: eines hinzufügen oder sein "
     "Kamerasymbol in der Gliederung einschalten.",

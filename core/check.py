@@ -17,6 +17,8 @@ _FAR = 1e5
 #: Share of their squared extent that the faces to be baked must cover: less is the rounding of none.
 _NO_AREA = 1e-14
 
+#: Share of the scene's extent under which an object is lost between two coordinates of single precision.
+_LOST = 2.0 * float(np.finfo(np.float32).eps)
 #: Output triangles beyond which no machine that Blender runs on holds a bake.
 _MOST_CELLS = 20_000_000
 
@@ -39,6 +41,7 @@ def check_scene(scene: Scene) -> Scene:
     for scene_object in objects:
         _check_object(scene_object, len(scene.surfaces))
     _check_area([o for o in objects if o.receives])
+    _check_sizes(objects)
     warnings = list(scene.warnings)
     surfaces = tuple(_check_surface(surface, warnings) for surface in scene.surfaces)
     for lamp in scene.lamps:
@@ -85,6 +88,22 @@ def _check_area(receivers: list[SceneObject]) -> None:
     if not any(map(_has_area, receivers)):
         names = ", ".join(f"'{o.name}'" for o in receivers[:3])
         raise SceneError(f"Nothing to bake: the faces of {names} have no area. Check its scale, or delete them.")
+
+
+def _check_sizes(objects: tuple[SceneObject, ...]) -> None:
+    """A vertex that flew off makes the scene so large that nothing else has a size in it."""
+    corners = [o.vertices[o.triangles].reshape(-1, 3) for o in objects]
+    low, high = (np.stack([end(c, axis=0) for c in corners]) for end in (np.min, np.max))
+    extent = float((high.max(axis=0) - low.min(axis=0)).max())
+    receives = np.array([o.receives for o in objects])
+    lost = np.flatnonzero(receives & ((high - low).max(axis=1) < _LOST * extent))
+    if len(lost):
+        reach = np.maximum(np.abs(low - low[lost[0]]), np.abs(high - low[lost[0]])).max(axis=1)
+        name, far = objects[lost[0]].name, objects[int(reach.argmax())].name
+        raise SceneError(
+            f"'{name}' is lost in a scene of {extent:.0e} m, where nothing so small can be told apart: move '{far}' "
+            "nearer, or delete its vertices that are far away."
+        )
 
 
 def _has_area(scene_object: SceneObject) -> bool:

@@ -47,6 +47,12 @@ BAD = {
         "Nothing",
     ),
     "no area": (lambda s: with_object(s, vertices=s.objects[0].vertices * 0), "'Floor' have no area"),
+    "lost beside what flew off": (
+        lambda s: replace(
+            s, objects=(*s.objects, replace(s.objects[0], name="Kite", vertices=s.objects[0].vertices + 1e20))
+        ),
+        "'Floor' is lost in a scene of 1e[+]20 m.*'Kite'",
+    ),
     "no receiver": (lambda s: with_object(s, receives=False), "Nothing to bake"),
     "vertex too high": (lambda s: with_object(s, triangles=np.array([[0, 1, 4], [0, 2, 3]], np.int32)), "'Floor'"),
     "vertex negative": (lambda s: with_object(s, triangles=np.array([[0, 1, -1], [0, 2, 3]], np.int32)), "'Floor'"),
