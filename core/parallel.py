@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, Self, TypeVar
 
 from .blas import one_thread
 from .progress import Progress
 
 Result = TypeVar("Result")
+
+#: Calls for each thread that are handed over ahead of those whose results were taken. When Blender quits, Python waits
+#: for all that were handed over, and takes no more.
+_AHEAD = 4
 
 
 def thread_count(asked: int) -> int:
@@ -56,4 +61,18 @@ class Workers:
 
         calls = list(zip(*items, strict=False))  # some are endless repetitions
         # A single one is done sooner here than it is handed over.
-        return self._pool.map(work, calls) if len(calls) > 1 else map(work, calls)
+        return self._ahead(work, calls) if len(calls) > 1 else map(work, calls)
+
+    def _ahead(self, work: Callable[[Any], Result], calls: list[Any]) -> Iterator[Result]:
+        """Results of all calls in order, each begun only a few ahead of those that were taken."""
+        under_way: deque[Future[Result]] = deque()
+        try:
+            for call in calls:
+                if len(under_way) == _AHEAD * self.threads:
+                    yield under_way.popleft().result()
+                under_way.append(self._pool.submit(work, call))
+            while under_way:
+                yield under_way.popleft().result()
+        finally:
+            for future in under_way:
+                future.cancel()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 
@@ -72,3 +74,23 @@ def test_an_error_in_a_chunk_comes_out():
 def test_threads_are_as_asked_or_as_many_as_there_are_cores():
     assert thread_count(3) == 3
     assert thread_count(0) >= 1
+
+
+def test_blender_can_quit_while_chunks_wait():
+    """The main thread ends while another works off 1,000 chunks of 50 ms: Python waits for those that were handed over,
+    not for all of them."""
+    quits = """
+import threading, time
+from radiosity_baker.core.parallel import Workers
+from radiosity_baker.core.progress import Progress
+def bake():
+    with Workers(2, Progress()) as workers:
+        for _ in workers.map(lambda *_: time.sleep(0.05), 1000, 1):
+            begun.set()
+begun = threading.Event()
+threading.Thread(target=bake, daemon=True).start()
+begun.wait()
+print(time.time())
+"""
+    run = subprocess.run([sys.executable, "-c", quits], capture_output=True, text=True, check=True)
+    assert time.time() - float(run.stdout) < 1000 * 0.05 / 2 / 3
