@@ -95,8 +95,8 @@ def _check_sizes(objects: tuple[SceneObject, ...]) -> None:
     corners = [o.vertices[o.triangles].reshape(-1, 3) for o in objects]
     low, high = (np.stack([end(c, axis=0) for c in corners]) for end in (np.min, np.max))
     extent = float((high.max(axis=0) - low.min(axis=0)).max())
-    receives = np.array([o.receives for o in objects])
-    lost = np.flatnonzero(receives & ((high - low).max(axis=1) < _LOST * extent))
+    own, receives = (high - low).max(axis=1), np.array([o.receives for o in objects])
+    lost = np.flatnonzero(receives & (own > 0.0) & (own < _LOST * extent))
     if len(lost):
         reach = np.maximum(np.abs(low - low[lost[0]]), np.abs(high - low[lost[0]])).max(axis=1)
         name, far = objects[lost[0]].name, objects[int(reach.argmax())].name

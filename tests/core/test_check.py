@@ -109,6 +109,11 @@ def test_empty_objects_are_left_out(good):
     assert [o.name for o in check_scene(replace(good, objects=(empty, *good.objects))).objects] == ["Floor"]
 
 
+def test_an_object_that_was_scaled_to_nothing_hinders_no_other(build, good):
+    point = replace(build.quad("Point"), vertices=np.zeros((4, 3)))
+    assert len(check_scene(replace(good, objects=(*good.objects, point))).objects) == 2
+
+
 def test_objects_and_lamps_come_in_the_order_of_their_names(build, good):
     others = tuple(build.quad(name) for name in ("b", "a", "c"))
     lamps = tuple(replace(LAMP, name=name) for name in ("z", "y"))
