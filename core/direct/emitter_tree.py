@@ -49,8 +49,8 @@ class EmitterTree:
         spread = ((corners - center[:, None]) ** 2).sum(axis=(1, 2)) / 12 + (center**2).sum(axis=1)
         x, y, z = normals.T
         columns = np.column_stack([np.ones_like(power), center, spread, x * x, y * y, z * z, x * y, y * z, z * x])
-        sums = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(power[:, None] * columns, axis=0)])
-        self._levels = [_level(sums[cut[1:]] - sums[cut[:-1]]) for cut in cuts]
+        weighed = power[:, None] * columns
+        self._levels = [_level(_sums(weighed, cut)) for cut in cuts]
         self._triangle = np.minimum(cuts[-1][:-1], len(area) - 1)
 
     def shoot(self, points: Float32, shading: Float32, unit: Float32) -> Shots:
@@ -112,6 +112,15 @@ def _promise(facts: Float32, points: Float32, shading: Float32) -> Float32:
     slant = x * x * xx + y * y * yy + z * z * zz + 2 * (x * y * xy + y * z * yz + z * x * zx)
     slant = np.sqrt(np.maximum(slant, 0) / np.maximum(squared, np.float32(1e-12)))
     return np.asarray(power * cosine * (slant + _LEAST_SLANT) / apart)
+
+
+def _sums(weighed: Float64, cut: NDArray[np.int64]) -> Float64:
+    """(m, 11) over the triangles from each cut to the next. Differences of running sums would leave to triangles
+    without area what rounding leaves of the others."""
+    sums = np.zeros((len(cut) - 1, weighed.shape[1]))
+    filled = cut[1:] > cut[:-1]
+    sums[filled] = np.add.reduceat(weighed, cut[:-1][filled], axis=0)
+    return sums
 
 
 def _level(sums: Float64) -> Float32:

@@ -117,3 +117,15 @@ def test_one_sided_emitters_light_what_is_before_them_as_two_sided_ones_do_and_n
     assert np.array_equal(before, irradiance(below, NORMAL, one_sided=False))
     assert irradiance(above, -NORMAL, one_sided=True).max() == 0
     assert irradiance(above, -NORMAL, one_sided=False).min() > 0
+
+
+def test_triangles_without_area_say_nothing_and_take_nothing():
+    """All in a line, but for rounding: from running sums they got what rounding left of the others, times 1e300."""
+    triangles = plate(0.8)
+    folded = triangles[:40] + np.array([0.1, 0.7, 0.0])
+    folded[:, 2] = 0.7 * folded[:, 0] + 0.3 * folded[:, 1]
+    every = np.concatenate([triangles, folded])
+    light = seen(EmitterTree(every, np.tile(RADIANCE, (len(every), 1))), triangles, (0, 0, 0))
+    alone = seen(EmitterTree(triangles, np.tile(RADIANCE, (len(triangles), 1))), triangles, (0, 0, 0))
+    error = np.hypot(light.irradiance.std(axis=0), alone.irradiance.std(axis=0)) / np.sqrt(TRIES)
+    assert (np.abs(light.irradiance.mean(axis=0) - alone.irradiance.mean(axis=0)) <= 4 * error).all()
