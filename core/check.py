@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from .cost import refuse_without_room
-from .patches import triangle_geometry
+from .patches import bounds, triangle_geometry
 from .plan import Plan
 from .scene import ALBEDO_LIMIT, AreaLamp, Scene, SceneError, SceneObject, SkyMap, Surface
 
@@ -92,8 +92,7 @@ def _check_area(receivers: list[SceneObject]) -> None:
 
 def _check_sizes(objects: tuple[SceneObject, ...]) -> None:
     """A vertex that flew off makes the scene so large that nothing else has a size in it."""
-    corners = [o.vertices[o.triangles].reshape(-1, 3) for o in objects]
-    low, high = (np.stack([end(c, axis=0) for c in corners]) for end in (np.min, np.max))
+    low, high = bounds(objects)
     extent = float((high.max(axis=0) - low.min(axis=0)).max())
     own, receives = (high - low).max(axis=1), np.array([o.receives for o in objects])
     lost = np.flatnonzero(receives & (own > 0.0) & (own < _LOST * extent))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .receivers import Receivers, shared_edges
+from .receivers import Receivers, next_corner, shared_edges
 from .scene import Bool, Float64
 from .tessellation import Int64
 
@@ -64,11 +64,11 @@ class _Quads:
         vertex, parent = receivers.corner_vertex.ravel(), receivers.parent
         here, there = shared_edges(vertex[corner])
         first, second = here[:, 0] // 3, there[:, 0] // 3
-        side, back = here[:, 0], np.where(_next(there[:, 1]) == there[:, 0], there[:, 1], there[:, 0])
+        side, back = here[:, 0], np.where(next_corner(there[:, 1]) == there[:, 0], there[:, 1], there[:, 0])
         over = np.full(corner.size, -1)
         over[side], over[back] = second, first
-        apex, far = _next(here[:, 1]), _next(_next(back))
-        beyond = over[np.stack([here[:, 1], apex, _next(back), far], axis=1)]
+        apex, far = next_corner(here[:, 1]), next_corner(next_corner(back))
+        beyond = over[np.stack([here[:, 1], apex, next_corner(back), far], axis=1)]
         movable = (parent[first] == parent[second]) & ~fixed[first] & ~fixed[second]
         corners = corner.ravel()[np.stack([here[:, 0], here[:, 1], apex, far], axis=1)]
         return cls(first, second, corners, beyond, movable)
@@ -134,8 +134,3 @@ def _apart(gain: Float64, first: Int64, second: Int64, beyond: Int64) -> Int64:
         np.maximum.at(best, triangles, rank)
     around = np.maximum(best[beyond].max(axis=1, initial=0), np.maximum(best[first], best[second]))
     return np.flatnonzero(rank >= around)
-
-
-def _next(corner: np.ndarray) -> np.ndarray:
-    """The next corner of the same triangle."""
-    return np.asarray(corner - corner % 3 + (corner + 1) % 3)

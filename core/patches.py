@@ -6,6 +6,7 @@ do not depend on scale, and areas turn back into m^2 by `metres ** 2`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -107,11 +108,16 @@ class Patches:
         return Cells(self.corners, self.normals, self.area, None, every, None, every)
 
 
+def bounds(objects: Sequence[SceneObject]) -> tuple[Float64, Float64]:
+    """Least and largest coordinates (o, 3) of each object's faces, metres; loose vertices do not count."""
+    used = [o.vertices[np.bincount(o.triangles.ravel(), minlength=len(o.vertices)) > 0] for o in objects]
+    return np.stack([v.min(axis=0) for v in used]), np.stack([v.max(axis=0) for v in used])
+
+
 def unit_space(scene: Scene) -> Space:
     """The smallest cube around all objects, blown up by nothing: its half edge becomes one."""
-    used = [o.vertices[np.bincount(o.triangles.ravel(), minlength=len(o.vertices)) > 0] for o in scene.objects]
-    low = np.min([vertices.min(axis=0) for vertices in used], axis=0)
-    high = np.max([vertices.max(axis=0) for vertices in used], axis=0)
+    lows, highs = bounds(scene.objects)
+    low, high = lows.min(axis=0), highs.max(axis=0)
     return Space((low + high) / 2, max(float((high - low).max()) / 2, 1e-30))
 
 

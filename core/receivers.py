@@ -260,12 +260,17 @@ def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
     one, two = order[pairs], order[pairs + 1]
 
     def ends(edge: np.ndarray) -> np.ndarray:
-        return np.column_stack([edge, edge - edge % 3 + (edge + 1) % 3])
+        return np.column_stack([edge, next_corner(edge)])
 
     here, there = ends(one), ends(two)
     turned = a[one] != a[two]
     there[turned] = there[turned][:, ::-1]
     return here, there
+
+
+def next_corner(corner: np.ndarray) -> np.ndarray:
+    """The corner that follows in the same triangle, by numbers 3 t + i; of a side, where it ends."""
+    return np.asarray(corner - corner % 3 + (corner + 1) % 3)
 
 
 def numbered_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from .receivers import Receivers, numbered_edges, shared_edges
+from .receivers import Receivers, next_corner, numbered_edges, shared_edges
 from .scene import Bool, Float64, Int32
 from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradients
 from .tessellation import Int64
@@ -407,14 +407,14 @@ def gradient_jumps(receivers: Receivers, measured: Bool) -> Jumps:
     flat_vertex = vertex.ravel()
     vertices = np.stack([flat_vertex[c] for c in (here[:, 0], here[:, 1], apex_here, apex_there)], axis=1)
     usable = solid & measured[vertices].all(axis=1)
-    # The side that joins the apex to one end of the edge lies opposite the other end.
+    # The side that joins the apex to one end of the edge lies opposite the other, and begins at the corner after that.
     sides = np.stack(
         [
-            _opposite(apex_here),
-            _opposite(here[:, 1]),
-            _opposite(here[:, 0]),
-            _opposite(there[:, 1]),
-            _opposite(there[:, 0]),
+            next_corner(apex_here),
+            next_corner(here[:, 1]),
+            next_corner(here[:, 0]),
+            next_corner(there[:, 1]),
+            next_corner(there[:, 0]),
         ],
         axis=1,
     )
@@ -426,8 +426,3 @@ def _third(ends: np.ndarray) -> np.ndarray:
     """The corner of the same triangle that is neither end of an edge, by numbers 3 t + i: (e, 2) to (e,)."""
     first = ends[:, 0] - ends[:, 0] % 3
     return np.asarray(first + 3 - ends[:, 0] % 3 - ends[:, 1] % 3)
-
-
-def _opposite(corner: np.ndarray) -> np.ndarray:
-    """The side opposite a corner: it begins at the next one."""
-    return np.asarray(corner - corner % 3 + (corner + 1) % 3)

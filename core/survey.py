@@ -206,7 +206,6 @@ class Survey:
         self._mean = 0.0
         #: The cells that passes look at.
         self._fresh = np.arange(count)
-        self._index: NDArray[np.int64] | slice = slice(None)
 
     def recall(self, earlier: Survey) -> None:
         """Before the first pass: take the samples of the cells that an earlier survey had as well, and look at the
@@ -222,7 +221,12 @@ class Survey:
             self._signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
             self._signatures[-1][here] = signature[there]
         self._mean = earlier._mean
-        self._fresh = self._index = np.setdiff1d(self._fresh, here)
+        self._fresh = np.setdiff1d(self._fresh, here)
+
+    @property
+    def _index(self) -> NDArray[np.int64] | slice:
+        """The same cells; a slice where they are all, for sums over that take no copies."""
+        return self._fresh if len(self._fresh) < len(self.invalid) else slice(None)
 
     @property
     def error(self) -> float:
