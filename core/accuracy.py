@@ -89,15 +89,14 @@ def fit_halves(
     (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
     a squared error of the light there counts. loose: how many times as far as usual fits may be from the best. each: a
     `map` that may use threads."""
-    merged, to_grey = halves[0] + halves[1], halves[0].to_grey
-    limits, together = fit.limits(merged), fit.system(merged)
-    del merged  # large meshes need the room
+    to_grey = halves[0].to_grey
+    limits, together = fit.limits(*halves), fit.system(*halves)
     grey = list(each(Samples.grey, halves))
     systems = list(each(fit.system, grey))
     tried: list[_Halves] = []
     best = [fit.averages(system) for system in systems]
     smoother = fit.measured
-    level = np.zeros(len(smoother), dtype=np.int64)
+    level = np.zeros(len(smoother), dtype=np.int8)
     for alpha in ALPHAS:
         # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
         rough = _ROUGH * (loose if tried else 1.0)

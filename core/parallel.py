@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -32,11 +33,15 @@ class Workers:
     def __init__(self, threads: int, progress: Progress) -> None:
         self.threads = thread_count(threads)
         self.progress = progress
-        self._pool = ThreadPoolExecutor(self.threads, "radiosity")
+        self._here = threading.local()
+        self._pool = ThreadPoolExecutor(self.threads, "radiosity", self._enter_thread)
 
     def __enter__(self) -> Self:
         one_thread.__enter__()
         return self
+
+    def _enter_thread(self) -> None:
+        self._here.is_one = True
 
     def __exit__(self, *_: object) -> None:
         self._pool.shutdown(wait=True, cancel_futures=True)
@@ -53,7 +58,7 @@ class Workers:
         return self.each(work, range(-(-count // chunk)))
 
     def each(self, function: Callable[..., Result], *items: Iterable[Any]) -> Iterator[Result]:
-        """As the built-in map, but on the threads. Raises Cancelled before an item."""
+        """As the built-in map, but on the threads, also from within one. Raises Cancelled before an item."""
 
         def work(arguments: tuple[Any, ...]) -> Result:
             self.progress.check()
@@ -65,14 +70,26 @@ class Workers:
 
     def _ahead(self, work: Callable[[Any], Result], calls: list[Any]) -> Iterator[Result]:
         """Results of all calls in order, each begun only a few ahead of those that were taken."""
-        under_way: deque[Future[Result]] = deque()
+        under_way: deque[tuple[Future[Result], list[Any]]] = deque()
+        # One of the threads does itself what no other has begun: all could be waiting for each other.
+        helps = getattr(self._here, "is_one", False)
+
+        def begin(call: Any) -> tuple[Future[Result], list[Any]]:
+            # Whoever does it takes it out: the pool does not let go of what was cancelled.
+            box = [call]
+            return self._pool.submit(lambda: work(box.pop())), box
+
+        def taken() -> Result:
+            future, box = under_way.popleft()
+            return work(box.pop()) if helps and future.cancel() else future.result()
+
         try:
             for call in calls:
                 if len(under_way) == _AHEAD * self.threads:
-                    yield under_way.popleft().result()
-                under_way.append(self._pool.submit(work, call))
+                    yield taken()
+                under_way.append(begin(call))
             while under_way:
-                yield under_way.popleft().result()
+                yield taken()
         finally:
-            for future in under_way:
+            for future, _ in under_way:
                 future.cancel()

@@ -37,7 +37,7 @@ def patches_by_light(
 ) -> tuple[Patches, Visibility]:
     """About effort.patches patches, and more where direct light varies; and what is visible among them."""
     split = split_objects(scene, effort.patches)
-    patches = make_patches(scene, space, split)
+    patches = make_patches(scene, space, split, pilot.like(space, split))
     visibility = pilot.visibility_for(patches)
     light = DirectLight(lights, visibility, seed, effort.lights)
     triangles = len(patches.area)
@@ -50,8 +50,8 @@ def patches_by_light(
         uneven = fresh[over_fair_share(weight, fair, _GROWTH * effort.patches - len(patches))]
         if not len(uneven):
             break
-        split, changed = _refined(split, patches, uneven)
-        patches = make_patches(scene, space, split)
+        before, (split, changed) = split, _refined(split, patches, uneven)
+        patches = make_patches(scene, space, split, patches if split.same_triangles(before) else None)
         fresh = np.unique(patches.patch[changed[patches.triangle]])
     # Patches of dense meshes get finer by fewer triangles each: the same triangles meet the rays.
     return patches, visibility if len(patches.area) == triangles else Visibility(patches.corners, patches.optics)
@@ -96,6 +96,10 @@ def _refined(split: PatchMeshes, patches: Patches, uneven: Int64) -> tuple[Patch
     ends = np.cumsum([0, *(len(m.triangles) for m in split.meshes)])
     meshes, sources = [], []
     for mesh, begin, end in zip(split.meshes, ends[:-1], ends[1:], strict=True):
+        if not marked[begin:end].any():
+            meshes.append(mesh)
+            sources.append(np.arange(begin, end))
+            continue
         finer, source = split_triangles(mesh, marked[begin:end])
         meshes.append(finer)
         sources.append(source + begin)

@@ -140,6 +140,11 @@ class PatchMeshes:
     edge: float
     halvings: Int64
 
+    def same_triangles(self, other: PatchMeshes) -> bool:
+        """Whether the other's are those of the same meshes, and nothing was split in either."""
+        pairs = zip(self.meshes, other.meshes, strict=True)
+        return all(m.triangles is o.triangles and m.vertices is o.vertices for m, o in pairs)
+
 
 def split_objects(scene: Scene, wanted: int) -> PatchMeshes:
     """Split the triangles of all objects so that about `wanted` of one size would cover them."""
@@ -148,28 +153,37 @@ def split_objects(scene: Scene, wanted: int) -> PatchMeshes:
     return PatchMeshes(meshes, edge, np.zeros(sum(len(m.triangles) for m in meshes), dtype=np.int64))
 
 
-def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
-    """A patch for each triangle; where an object is denser than patches are, one for several neighbours."""
-    corners = space.normalise(np.concatenate([m.vertices[m.triangles] for m in split.meshes]))
-    surface = np.concatenate([o.surface[m.parent] for o, m in zip(scene.objects, split.meshes, strict=True)])
-    number = np.repeat(np.arange(len(split.meshes)), [len(m.triangles) for m in split.meshes])
-    entire = np.concatenate([np.bincount(m.parent)[m.parent] == 1 for m in split.meshes])
-    normals, area = triangle_geometry(corners)
-    solid = np.flatnonzero(area > 0)
-    edge = split.edge / space.metres / 2.0**split.halvings
-    small = solid[(entire & (area < _SMALL * edge * edge / 2))[solid]]
-    centre = (corners[:, 0] + corners[:, 1] + corners[:, 2]) / 3.0  # four times as fast as a mean over so short an axis
-    cube = np.floor(centre / (0.8 * edge)[:, None])
-    alike = np.column_stack([number, surface, split.halvings, cube, np.rint(normals * 1.5)]).astype(np.int64)
-    patch = _renumbered(group_alike(len(area), small, alike[small])[solid])
+def make_patches(scene: Scene, space: Space, split: PatchMeshes, like: Patches | None = None) -> Patches:
+    """A patch for each triangle; where an object is denser than patches are, one for several neighbours.
+
+    like: patches of the same triangles, if there are any: what shape these have is known then.
+    """
+    if like is None:
+        corners = space.normalise(np.concatenate([m.vertices[m.triangles] for m in split.meshes]))
+        normals, area = triangle_geometry(corners)
+        solid = np.flatnonzero(area > 0)
+        corners, normals, area = corners[solid], normals[solid], area[solid]
+    else:
+        corners, normals, area, solid = like.corners, like.normals, like.area, like.triangle
+    surface = np.concatenate([o.surface[m.parent] for o, m in zip(scene.objects, split.meshes, strict=True)])[solid]
+    number = np.repeat(np.arange(len(split.meshes)), [len(m.triangles) for m in split.meshes])[solid]
+    entire = np.concatenate([np.bincount(m.parent)[m.parent] == 1 for m in split.meshes])[solid]
+    halvings = split.halvings[solid]
+    edge = split.edge / space.metres / 2.0**halvings
+    small = np.flatnonzero(entire & (area < _SMALL * edge * edge / 2))
+    grouped = corners[small]
+    centre = (grouped[:, 0] + grouped[:, 1] + grouped[:, 2]) / 3.0  # four times as fast as a mean over so short an axis
+    cube, facing = np.floor(centre / (0.8 * edge[small])[:, None]), np.rint(normals[small] * 1.5)
+    alike = np.column_stack([number[small], surface[small], halvings[small], cube, facing]).astype(np.int64)
+    patch = _renumbered(group_alike(len(area), small, alike))
     members = np.argsort(patch, kind="stable").astype(np.int32)
     count = int(patch.max()) + 1
     patch_surface = np.empty(count, dtype=np.int32)
-    patch_surface[patch] = surface[solid]
-    patch_area = np.bincount(patch, weights=area[solid], minlength=count).astype(np.float64)
+    patch_surface[patch] = surface
+    patch_area = np.bincount(patch, weights=area, minlength=count).astype(np.float64)
     colours = constant_colours(scene, patch_surface)
     if any(varies(scene, o) for o in scene.objects):
-        colours = _mean_colours(scene, split, solid, patch, area[solid] / patch_area[patch])
+        colours = _mean_colours(scene, split, solid, patch, area / patch_area[patch])
     coverage = np.array([s.opacity * stopping_share(s) for s in scene.surfaces])[patch_surface]
     front = np.array([s.front_share for s in scene.surfaces])[patch_surface]
     one_sided = np.array([s.one_sided and max(s.emission) > 0 for s in scene.surfaces])[patch_surface]
@@ -180,20 +194,20 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes) -> Patches:
     uv = _opacity_uv(scene, split)
     optics = make_optics(
         scene,
-        surface[solid].astype(np.int32),
+        surface.astype(np.int32),
         shadowless[solid],
-        corners[solid],
-        normals[solid],
+        corners,
+        normals,
         None if uv is None else uv[solid],
     )
     filled = np.ones(count)
     if optics is not None and uv is not None:
-        filled = np.bincount(patch, area[solid] / patch_area[patch] * _filled(optics), count).astype(np.float64)
+        filled = np.bincount(patch, area / patch_area[patch] * _filled(optics), count).astype(np.float64)
     return Patches(
         space=space,
-        corners=corners[solid],
-        normals=normals[solid],
-        area=area[solid],
+        corners=corners,
+        normals=normals,
+        area=area,
         triangle=solid,
         patch=patch,
         members=members,

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .patches import Patches, make_patches, split_objects, unit_space
+from .patches import Patches, PatchMeshes, Space, make_patches, split_objects, unit_space
 from .sampling import cosine_patterns, frames, stream
 from .scene import Bool, Float32, Float64, Int32, Scene
 from .tessellation import Int64
@@ -35,13 +35,22 @@ class Pilot:
     scene: Scene
 
     @cached_property
+    def _split(self) -> PatchMeshes:
+        return split_objects(self.scene.surroundings(), _PATCHES)
+
+    @cached_property
     def patches(self) -> Patches:
-        around = self.scene.surroundings()
-        return make_patches(around, unit_space(self.scene), split_objects(around, _PATCHES))
+        return make_patches(self.scene.surroundings(), unit_space(self.scene), self._split)
 
     @cached_property
     def visibility(self) -> Visibility:
         return Visibility(self.patches.corners, self.patches.optics)
+
+    def like(self, space: Space, split: PatchMeshes) -> Patches | None:
+        """The pilot's patches, where they are of the same triangles: where all of these are smaller than patches."""
+        here = self.patches.space
+        placed = np.array_equal(space.center, here.center) and space.metres == here.metres
+        return self.patches if placed and split.same_triangles(self._split) else None
 
     def visibility_for(self, patches: Patches) -> Visibility:
         """What is visible among some patches: what is ready, where they are of the same triangles."""

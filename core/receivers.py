@@ -143,7 +143,8 @@ def lay_out(
     if not tessellate:
         element = np.concatenate([begin + m.parent for begin, m in zip(first, fine, strict=False)]).astype(np.int32)
         barycentric = np.concatenate([m.barycentric for m in fine])
-        element_corners, _, _, element_shading, element_surface = _faces(objects, meshes, space)
+        if len(element) > first[-1]:
+            element_corners, _, _, element_shading, element_surface = _faces(objects, meshes, space)
     flat = all(o.corner_normals is None for o in objects)
     return Receivers(
         space=space,
@@ -165,12 +166,14 @@ def _faces(
     (t, 3, 3) and surfaces (t,)."""
     corners = np.concatenate([space.normalise(m.vertices)[m.triangles] for m in meshes])
     normals, area = triangle_geometry(corners)
+    surface = np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)])
+    if all(o.corner_normals is None for o in objects):
+        return corners, normals, area, np.broadcast_to(normals[:, None], corners.shape), surface.astype(np.int32)
     ends = np.cumsum([len(m.triangles) for m in meshes])[:-1]
     shading = [
         shading_normals(o, m.parent, m.barycentric, n)
         for o, m, n in zip(objects, meshes, np.split(normals, ends), strict=True)
     ]
-    surface = np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)])
     return corners, normals, area, np.concatenate(shading), surface.astype(np.int32)
 
 

@@ -7,9 +7,9 @@ space and jump nowhere, so the mean of every connected surface is kept exactly.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -93,9 +93,8 @@ class Samples:
 
     @property
     def lumped(self) -> Float64:
-        """(c, 3) sums of the moments over the second corner: how much the samples weigh at each."""
-        m = self.moments
-        return np.asarray(m[:, :3] + m[:, [3, 3, 4]] + m[:, [4, 5, 5]])
+        """(c, 3) how much the samples weigh at each corner."""
+        return lumped_moments(self.moments)
 
     def grey(self) -> Samples:
         """The same samples of the mean light alone."""
@@ -113,6 +112,16 @@ class Samples:
         total += y * (m[1] * y + 2.0 * (m[5] * z - light[1]))
         total += z * (m[2] * z - 2.0 * light[2])
         return np.maximum(self.squares + total, 0.0) / np.maximum(self.count, 1.0)
+
+
+def _sum(arrays: Iterable[Float64]) -> Float64:
+    """Of arrays of one shape."""
+    return reduce(np.add, arrays)
+
+
+def lumped_moments(moments: Float64) -> Float64:
+    """(c, 3) sums of the moments (c, 6) over the second corner."""
+    return np.asarray(moments[:, :3] + moments[:, [3, 3, 4]] + moments[:, [4, 5, 5]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,20 +159,23 @@ class Fit:
         apexes = jumps.vertices[:, 2:]
         self._pattern = SymmetricPattern(self._count, np.concatenate([self._edge_ends, apexes]).astype(np.int64))
         self._jumps = jumps
+        self._around = self._cells_around()
         self._penalty, self._pair_penalty = self._penalties(jumps.weight)
 
-    def system(self, samples: Samples) -> System:
-        """Mass matrix and right-hand side of one set of samples, each cell weighing as much as its area in sight."""
-        weight = self._receivers.cells.area / np.maximum(samples.tried, 1)
-        moments = samples.moments * weight[:, None]
-        light = samples.light * weight[:, None, None]
+    def system(self, *samples: Samples) -> System:
+        """Mass matrix and right-hand side of sets of samples taken together, each cell weighing as much as its area in
+        sight."""
+        # A channel at a time: large meshes need the room.
+        weight = self._receivers.cells.area / np.maximum(_sum(s.tried for s in samples), 1)
+        moments = _sum(s.moments for s in samples) * weight[:, None]
         edges = self._edge[self._receivers.cells.element].ravel()
-        known = self.measured
+        channels, known = range(len(samples[0].to_grey)), self.measured
+        light = (_sum(s.light[..., k] for s in samples) * weight[:, None] for k in channels)
         return System(
             diagonal=self._scatter(moments[:, :3]) * known,
             edges=np.bincount(edges, moments[:, _SIDE_MOMENT].ravel(), len(self._edge_ends)) * self._both_known,
-            target=np.stack([self._scatter(light[..., k]) * known for k in range(light.shape[2])], axis=1),
-            lumped=self._scatter(samples.lumped * weight[:, None]),
+            target=np.stack([self._scatter(channel) * known for channel in light], axis=1),
+            lumped=self._scatter(lumped_moments(moments)),
         )
 
     def solve(
@@ -256,27 +268,36 @@ class Fit:
         averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
         return np.where(self.measured[:, None], averaged, 0.0)
 
-    def limits(self, samples: Samples) -> tuple[Float64, Float64]:
-        """Least and largest light (v, k) that a vertex may have: that of the samples in the triangles around it.
+    def _cells_around(self) -> tuple[Int32, Int64, Int64]:
+        """Vertices (m,) with cells around them, those cells one vertex after the other, and where each begins there.
+
+        Sorted once for all, extremes around vertices take a tenth of what minimum.at does.
+        """
+        vertex = self._corner.ravel()
+        order = np.argsort(vertex, kind="stable")
+        first = np.flatnonzero(np.diff(vertex[order], prepend=-1))
+        return vertex[order[first]], order // 3, first
+
+    def limits(self, *samples: Samples) -> tuple[Float64, Float64]:
+        """Least and largest light (v, k) that a vertex may have: that of all samples in the triangles around it.
 
         At the rim of a surface all samples lie to one side. The nearest of n samples misses the vertex by about
         1 / sqrt(n) of the triangle's size, so light may go on rising or falling by twice that share of what it does
         among them; but not where the other side is out of sight.
         """
-        # Sorted once for all channels: ten times as fast as minimum.at.
-        vertex = self._corner.ravel()
-        order = np.argsort(vertex, kind="stable")
-        first = np.flatnonzero(np.diff(vertex[order], prepend=-1))
-        met, cell = vertex[order[first]], order // 3
-        low, high = np.full((2, samples.low.shape[1], self._count), np.inf)
+        met, cell, first = self._around
+        low, high = np.full((2, len(samples[0].to_grey), self._count), np.inf)
         for k in range(len(low)):
-            low[k, met] = np.minimum.reduceat(samples.low[cell, k], first)
-            high[k, met] = np.maximum.reduceat(samples.high[cell, k], first)
+            least = np.minimum.reduce([s.low[:, k] for s in samples])
+            largest = np.maximum.reduce([s.high[:, k] for s in samples])
+            low[k, met] = np.minimum.reduceat(least[cell], first)
+            high[k, met] = np.maximum.reduceat(largest[cell], first)
+        count, tried = _sum(s.count for s in samples), _sum(s.tried for s in samples)
         cut_off = np.zeros(self._count, dtype=bool)
         for corner in self._corner.T:
-            cut_off[corner[samples.tried > samples.count]] = True
+            cut_off[corner[tried > count]] = True
         low, high = (np.where(np.isfinite(limit), limit, 0.0).T for limit in (low, high))
-        samples_around = self._scatter(np.repeat(samples.count[:, None], 3, axis=1))
+        samples_around = self._scatter(np.repeat(count[:, None], 3, axis=1))
         share = np.where(self._surrounded | cut_off, 0.0, 2.0 / np.sqrt(np.maximum(samples_around, 4.0)))
         beyond = share[:, None] * (high - low)
         # A sample of a hardly lit place may be below zero, so that many are right on average.
@@ -295,11 +316,17 @@ class Fit:
 
     def _penalties(self, weight: Float64) -> tuple[Float64, Float64]:
         """The squared jumps, each as heavy as weight (j,): diagonal (v,), and a value for each pair of the pattern."""
-        vertices, jump, sides = self._jumps.vertices, self._jumps.jump, self._jumps.sides
-        diagonal = np.bincount(vertices.ravel(), (weight[:, None] * jump**2).ravel(), self._count).astype(np.float64)
-        products = weight[:, None] * jump[:, _SIDE_START] * jump[:, _SIDE_END]
-        on_edges = np.bincount(self._edge.ravel()[sides].ravel(), products[:, :-1].ravel(), len(self._edge_ends))
-        return diagonal, np.concatenate([on_edges, products[:, -1]])
+        jumps, jump = self._jumps, self._jumps.jump.T
+        # A column at a time: large meshes need the room.
+        diagonal = np.zeros(self._count)
+        for vertex, own in zip(jumps.vertices.T, jump, strict=True):
+            diagonal += np.bincount(vertex, weight * own**2, self._count)
+        edge, on_edges = self._edge.ravel(), np.zeros(len(self._edge_ends))
+        pairs = zip(_SIDE_START, _SIDE_END, strict=True)
+        *products, across = (weight * jump[start] * jump[end] for start, end in pairs)
+        for side, product in zip(jumps.sides.T, products, strict=True):
+            on_edges += np.bincount(edge[side], product, len(on_edges))
+        return diagonal, np.concatenate([on_edges, across])
 
     def nearby(self, amounts: Float64) -> Float64:
         """(v,) how much of the amounts of the cells (c,) there is around each vertex, spread as far as _RINGS steps of
@@ -375,7 +402,7 @@ class Jumps:
     vertices: Int32
     jump: Float64
     weight: Float64
-    sides: np.ndarray
+    sides: Int32
 
 
 def gradient_jumps(receivers: Receivers, measured: Bool) -> Jumps:
@@ -419,7 +446,7 @@ def gradient_jumps(receivers: Receivers, measured: Bool) -> Jumps:
         axis=1,
     )
     weight = np.sqrt(squared) * mean / 3
-    return Jumps(vertices[usable], jump[usable], weight[usable], sides[usable])
+    return Jumps(vertices[usable], jump[usable], weight[usable], sides[usable].astype(np.int32))
 
 
 def _third(ends: np.ndarray) -> np.ndarray:

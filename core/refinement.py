@@ -163,8 +163,11 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
     in_sight = area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
-    # One after the other, each on all threads: both at once would need twice the memory.
-    fits = [fit_halves(fit, halves, in_sight, shown, loose, workers.each) for halves in sampled]
+
+    def fitted(halves: list[Samples]) -> Fitted:
+        return fit_halves(fit, halves, in_sight, shown, loose, workers.each)
+
+    fits = list(workers.each(fitted, sampled))
     reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
     emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
     return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)
@@ -175,8 +178,7 @@ def fit_alone(survey: Survey, alphas: tuple[Float64, ...]) -> Light:
     fit = Fit(survey.receivers, survey.lumped, survey.invalid)
     values = []
     for halves, alpha in zip((survey.direct, survey.indirect), alphas, strict=False):
-        both = halves[0] + halves[1]
-        values.append(fit.solve_within(fit.system(both), alpha, fit.limits(both)))
+        values.append(fit.solve_within(fit.system(*halves), alpha, fit.limits(*halves)))
     dark = np.zeros(len(survey.receivers.cells))
     return _light(survey, values, alphas, UNKNOWN, dark, fit)
 

@@ -94,3 +94,16 @@ print(time.time())
 """
     run = subprocess.run([sys.executable, "-c", quits], capture_output=True, text=True, check=True)
     assert time.time() - float(run.stdout) < 1000 * 0.05 / 2 / 3
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_work_may_call_for_work_on_the_threads_that_do_it(threads):
+    """With all threads at it and none left over, waiting for each other they would wait for ever."""
+    nested = f"""
+from radiosity_baker.core.parallel import Workers
+from radiosity_baker.core.progress import Progress
+with Workers({threads}, Progress()) as workers:
+    inner = lambda ten: list(workers.each(lambda one: ten + one, range(9)))
+    assert list(workers.each(inner, (10, 20, 30))) == [[ten + one for one in range(9)] for ten in (10, 20, 30)]
+"""
+    subprocess.run([sys.executable, "-c", nested], check=True, timeout=20)

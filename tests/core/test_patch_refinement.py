@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -82,3 +84,18 @@ def test_embree_serves_the_bake_where_its_triangles_are_those_of_the_pilot(build
     pilot = Pilot(scene)
     patches = make_patches(scene, unit_space(scene), split_objects(scene, wanted))
     assert (pilot.visibility_for(patches) is pilot.visibility) == (len(patches.area) == len(pilot.patches.area)) == same
+
+
+def test_shapes_that_the_pilot_knows_are_not_found_anew(build):
+    """A dense ball, of whose triangles nothing is split: only how they are grouped differs."""
+    scene = Scene((build.sphere(level=5),), (build.grey,) * 3)
+    space, split, pilot = unit_space(scene), split_objects(scene, 100), Pilot(scene)
+    known = pilot.like(space, split)
+    assert known is pilot.patches
+    grouped, anew = make_patches(scene, space, split, known), make_patches(scene, space, split)
+    assert grouped.corners is known.corners
+    assert len(grouped) < len(known)
+    for name in ("corners", "normals", "area", "triangle", "patch", "patch_area", "members", "albedo"):
+        assert np.array_equal(getattr(grouped, name), getattr(anew, name))
+    assert pilot.like(space, split_objects(scene, 30_000)) is None
+    assert pilot.like(replace(space, metres=2.0 * space.metres), split) is None
