@@ -26,9 +26,12 @@ class Points:
     @classmethod
     def of_pass(cls, cells: Cells, chosen: np.ndarray, number: int, shift: Float64) -> Points:
         """The sample points of one pass: the pass-th point of an even sequence in each cell."""
-        return cls(cells, chosen, triangle_points(plane_points(np.full(len(chosen), number), shift[chosen])))
+        weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
+        # All cells, as they are, need no copies.
+        every = len(chosen) == len(cells) and np.array_equal(chosen, np.arange(len(cells)))
+        return cls(cells, slice(None) if every else chosen, weights)
 
-    def __init__(self, cells: Cells, chosen: np.ndarray, weights: Float64) -> None:
+    def __init__(self, cells: Cells, chosen: np.ndarray | slice, weights: Float64) -> None:
         self.weights = weights
         self.positions = np.einsum("nc,nck->nk", self.weights, cells.corners[chosen])
         self.normals = cells.normals[chosen]

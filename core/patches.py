@@ -13,6 +13,7 @@ import numpy as np
 
 from .optics import Optics, make_optics, stopping_share
 from .scene import Bool, Float32, Float64, Int32, Scene, SceneObject
+from .sorting import distinct, stable_order
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
 from .textures import Colours, constant_colours, even_points, mean_colours, varies
 
@@ -176,7 +177,7 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes, like: Patches |
     cube, facing = np.floor(centre / (0.8 * edge[small])[:, None]), np.rint(normals[small] * 1.5)
     alike = np.column_stack([number[small], surface[small], halvings[small], cube, facing]).astype(np.int64)
     patch = _renumbered(group_alike(len(area), small, alike))
-    members = np.argsort(patch, kind="stable").astype(np.int32)
+    members = stable_order(patch).astype(np.int32)
     count = int(patch.max()) + 1
     patch_surface = np.empty(count, dtype=np.int32)
     patch_surface[patch] = surface
@@ -258,8 +259,8 @@ def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
     """(count,) the first of the chosen items with the same row of key (n, k); items that are not chosen stand alone."""
     group = np.arange(count)
     if len(chosen):
-        _, first, same = np.unique(row_numbers(key), return_index=True, return_inverse=True)
-        group[chosen] = chosen[first][same.reshape(-1)]
+        _, first, same = distinct(row_numbers(key))
+        group[chosen] = chosen[first][same]
     return group
 
 
@@ -277,8 +278,8 @@ def row_numbers(key: Int64) -> Int64:
         least = int(column.min())
         span = int(column.max()) - least + 1
         if count * span >= 2**63:
-            distinct, number = np.unique(number, return_inverse=True)
-            count = len(distinct)
+            number = distinct(number)[2]
+            count = int(number.max()) + 1
         number = number * span + (column - least)
         count *= span
     return number
@@ -297,7 +298,7 @@ def coarser_groups(patches: Patches) -> Int32:
     level = np.rint(np.log2(patches.patch_area / median) / 2.0)[:, None]
     edge = 2.0 * np.sqrt(median) * 2.0**level
     key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), patches.surface])
-    return np.unique(row_numbers(key.astype(np.int64)), return_inverse=True)[1].astype(np.int32)
+    return distinct(row_numbers(key.astype(np.int64)))[2].astype(np.int32)
 
 
 def shading_normals(receiver: SceneObject, parent: Int32, barycentric: Float64, normals: Float64) -> Float64:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
+from .sorting import distinct, stable_order
 from .tessellation import (
     Int64,
     Tessellation,
@@ -245,8 +246,10 @@ def fit_vertices(
     if breaks is not None:
         joined &= ~breaks.ravel()[here[:, 0]]
     label = _components(corner.size, here[joined].reshape(-1), there[joined].reshape(-1))
-    unique, number = np.unique(label, return_inverse=True)
-    return number.reshape(-1, 3).astype(np.int32), len(unique)
+    used = np.zeros(corner.size, dtype=np.int32)
+    used[label] = 1
+    number = np.cumsum(used, dtype=np.int32) - 1
+    return number[label].reshape(-1, 3), int(used.sum())
 
 
 def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
@@ -256,7 +259,7 @@ def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
     """
     a = triangles.reshape(-1)
     key = edge_keys(triangles, int(triangles.max(initial=0)) + 1).reshape(-1)
-    order = np.argsort(key, kind="stable")
+    order = stable_order(key)
     ordered = key[order]
     start = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
     pairs = start[np.diff(np.r_[start, len(ordered)]) == 2]
@@ -279,7 +282,7 @@ def next_corner(corner: np.ndarray) -> np.ndarray:
 def numbered_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
     """The number (t, 3) of the edge from each corner to the next, and the vertices (e, 2) at the ends of each edge."""
     count = int(triangles.max(initial=0)) + 1
-    keys, number = np.unique(edge_keys(triangles, count), return_inverse=True)
+    keys, _, number = distinct(edge_keys(triangles, count).reshape(-1))
     return number.reshape(-1, 3), np.column_stack([keys // count, keys % count])
 
 

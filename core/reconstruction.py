@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from .receivers import Receivers, next_corner, numbered_edges, shared_edges
 from .scene import Bool, Float64, Int32
+from .sorting import stable_order
 from .symmetric_matrix import SymmetricMatrix, SymmetricPattern, conjugate_gradients
 from .tessellation import Int64
 
@@ -274,7 +275,7 @@ class Fit:
         Sorted once for all, extremes around vertices take a tenth of what minimum.at does.
         """
         vertex = self._corner.ravel()
-        order = np.argsort(vertex, kind="stable")
+        order = stable_order(vertex)
         first = np.flatnonzero(np.diff(vertex[order], prepend=-1))
         return vertex[order[first]], order // 3, first
 

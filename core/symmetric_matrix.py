@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .scene import Bool, Float64
+from .sorting import stable_order
 from .tessellation import Int64
 
 #: What rounding leaves of a residual, relative to the target.
@@ -23,13 +24,13 @@ class SymmetricPattern:
 
     def __init__(self, count: int, pairs: Int64) -> None:
         row, column = pairs.T.ravel(), pairs[:, ::-1].T.ravel()
-        order = np.argsort(row, kind="stable")
+        order = stable_order(row)
         # One more, for the places that are not filled.
         column, pair = np.append(column[order], 0), np.append(order % max(len(pairs), 1), len(pairs))
         length = np.bincount(row, minlength=count)
         first = np.cumsum(length) - length
-        longest = np.argsort(-length, kind="stable")
-        self.rank = np.argsort(longest)
+        longest = stable_order(length.max(initial=0) - length)
+        self.rank = stable_order(longest)
         self.blocks: list[tuple[Int64, Int64]] = []
         while len(longest):
             places = np.arange(length[longest[0]])[:, None]

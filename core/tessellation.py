@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .scene import Bool, Float64, Int32
+from .sorting import distinct
 
 Int64 = NDArray[np.int64]
 
@@ -25,6 +26,8 @@ _THREE_AE = np.array([[3, 1, 4], [0, 3, 4], [0, 4, 2]])
 _THREE_DC = np.array([[3, 1, 4], [0, 3, 2], [3, 4, 2]])
 
 MAXIMUM_PASSES = 24
+#: Lengths that differ by less, as logarithms to base 2, are the same.
+_SAME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,10 +119,10 @@ def _midpoints(mesh: Tessellation, parents: Int64, marked: Bool, places: Float64
     """One new vertex for each marked edge (n, 3) of the parents (n,), shared by the triangles on both of its sides."""
     count = len(mesh.vertices)
     keys = edge_keys(mesh.triangles[parents], count)[marked]
-    unique, at, number = np.unique(keys, return_index=True, return_inverse=True)
+    unique, at, number = distinct(keys)
     first, second, along = unique // count, unique % count, places[marked][at, None]
     midpoint = np.full(marked.shape, -1, dtype=np.int32)
-    midpoint[marked] = count + number.reshape(-1)
+    midpoint[marked] = count + number
     between = (1.0 - along) * mesh.vertices[first] + along * mesh.vertices[second]
     return midpoint, np.concatenate([mesh.vertices, between])
 
@@ -201,20 +204,27 @@ class _Measures:
     @staticmethod
     def of(vertices: list[Float64], triangles: list[Int32]) -> _Measures:
         corners = np.concatenate([v[t] for v, t in zip(vertices, triangles, strict=True)])
-        edges = corners[:, [1, 2, 0]] - corners
-        cross = np.cross(edges[:, 0], edges[:, 1])
-        squared = np.maximum(np.einsum("tij,tij->ti", edges, edges), np.finfo(float).tiny)
-        squared.sort(axis=1)
-        area = np.sqrt(np.einsum("tk,tk->t", cross, cross)) / 2.0
-        return _Measures(np.log2(squared[:, 2]) / 2.0, np.log2(squared[:, 1]) / 2.0, area)
+        first, second, third = corners.transpose(1, 2, 0)
+        edges = second - first, third - second, first - third
+        one, two = edges[:2]
+        cross = [one[i] * two[j] - one[j] * two[i] for i, j in ((1, 2), (2, 0), (0, 1))]
+        a, b, c = (np.maximum((edge * edge).sum(axis=0), np.finfo(float).tiny) for edge in edges)
+        larger, lesser = np.maximum(a, b), np.minimum(a, b)
+        longest, second_longest = np.maximum(larger, c), np.maximum(lesser, np.minimum(larger, c))
+        area = np.sqrt(cross[0] ** 2 + cross[1] ** 2 + cross[2] ** 2) / 2.0
+        return _Measures(np.log2(longest) / 2.0, np.log2(second_longest) / 2.0, area)
 
     def children(self, size: float) -> Float64:
         """Triangles that each splits into, from the number of halvings of its edges: exact for three equal depths."""
-        depths = [np.maximum(np.ceil(edge - np.log2(size) - 1e-9), 0.0) for edge in (self.longest, self.second)]
+        depths = [np.maximum(np.ceil(edge - np.log2(size) - _SAME), 0.0) for edge in (self.longest, self.second)]
         return np.asarray(np.exp2(depths[0] + depths[1]))
 
     def full_sized(self, size: float) -> float:
         """Triangles after splitting, small ones counted by their share of a right-angled one with the longest edge."""
-        children = self.children(size)
         share = np.minimum(self.area / (size * size / 4), 1.0)
-        return max(float(np.where(children > 1, children, share).sum()), 1e-9)
+        larger = np.flatnonzero(self.longest > np.log2(size) + _SAME)
+        share[larger] = self.only(larger).children(size)
+        return max(float(share.sum()), 1e-9)
+
+    def only(self, chosen: Int64) -> _Measures:
+        return _Measures(self.longest[chosen], self.second[chosen], self.area[chosen])
