@@ -23,7 +23,7 @@ from .receivers import Receivers, split_cells
 from .sampling import stream
 from .scene import Bool, Float64
 from .splitting import until_allowed
-from .survey import GAP, Surroundings, out_of_sight
+from .survey import GAP, Surroundings, Survey, out_of_sight
 from .tessellation import Int64
 
 #: How often a cell is split into four at most.
@@ -36,8 +36,6 @@ _LEFT_OF_STEP, _SHARE = 1 / 12, 1 / 4
 #: Points of a cell that tell whether a boundary crosses it; rays of each to tell whether it is inside a solid, and to a
 #: lamp with size.
 _POINTS, _RAYS, _SHADOW_RAYS = 4, 8, 4
-#: About how many points tell the mean light.
-_MEAN_POINTS = 4096
 #: Standard deviations by which the largest and the smallest of some points must differ to mean a jump.
 _SIGNIFICANT = 4.0
 #: Numbers of streams that no pass of the survey uses.
@@ -78,21 +76,21 @@ class Adaptation:
         self._around = around and around.with_rays(_RAYS, stream(seed, "contact patterns"))
         self._seed = seed
         self._workers = workers
-        self._mean = 0.0
         self.rays: Counter[str] = Counter()
 
-    def refine_receivers(self, receivers: Receivers, limit: int, error: float) -> Receivers:
-        """The receivers with at most `limit` cells, finer along boundaries, which then bring about `error` in all."""
-        every = np.arange(len(receivers.cells))
+    def refine_receivers(self, survey: Survey, limit: int, error: float) -> Receivers:
+        """The receivers of a survey's first pass with at most `limit` cells, finer along boundaries, which then bring
+        about `error` in all."""
+        receivers, hidden, direct = survey.receivers, survey.invalid, survey.direct[0].mean_grey
         area = receivers.cells.area
-        first = self._probe(receivers.cells, every, 0, 1, every >= 0)
-        mean = float(area @ first.direct[0] / area.sum())
+        mean = float(area @ direct / area.sum())
         allowed = (error * mean) ** 2 * float(area.sum())
-        fresh = _on_borders(receivers, first, _BOUNDARY_STEP**2 * allowed / len(area))
-        hidden, allowed = first.hidden[0], allowed * _SHARE / _LEFT_OF_STEP
+        fair = _BOUNDARY_STEP**2 * allowed / len(area)
+        fresh = _on_borders(receivers, survey.signatures[0], direct, hidden, fair)
+        allowed *= _SHARE / _LEFT_OF_STEP
         for level in range(LEVELS):
             near = _touching(receivers, hidden)
-            split, contact = self._worst(receivers.cells, fresh, level + 1, mean, allowed, limit, near)
+            split, contact = self._worst(receivers.cells, fresh, level, mean, survey.mean, allowed, limit, near)
             if not split.any():
                 break
             # What is hidden beside a contact must not be coarse either: light would reach far into it.
@@ -104,34 +102,39 @@ class Adaptation:
         return receivers
 
     def _worst(
-        self, cells: Cells, fresh: Int64, number: int, mean: float, allowed: float, limit: int, near: Bool
+        self,
+        cells: Cells,
+        fresh: Int64,
+        level: int,
+        direct: float,
+        mean: float,
+        allowed: float,
+        limit: int,
+        near: Bool,
     ) -> tuple[Bool, Bool]:
         """Which cells (c,) to split: of the fresh ones those with the largest squared jumps, until what is left is
-        allowed or there is no room; and which of them a contact crosses. near (c,): cells where there may be one."""
+        allowed or there is no room; and which of them a contact crosses. direct, mean: mean irradiance straight from
+        the sources, and in all; near (c,): cells where there may be a contact."""
         split, contact = np.zeros((2, len(cells)), dtype=bool)
         if len(fresh):
-            probe = self._probe(cells, fresh, number, _POINTS, near[fresh])
-            weight = np.where(probe.crossed(), probe.step(mean) ** 2 * cells.area[fresh], 0.0)
+            probe = self._probe(cells, fresh, level, mean, near[fresh])
+            weight = np.where(probe.crossed(), probe.step(direct) ** 2 * cells.area[fresh], 0.0)
             split[fresh[until_allowed(weight, allowed, limit - len(cells))]] = True
             contact[fresh[probe.contact()]] = True
         return split, split & contact
 
-    def _probe(self, cells: Cells, chosen: Int64, number: int, count: int, near: Bool) -> _Probe:
-        """What `count` points of each chosen cell see; near (n,): where they may be inside a solid."""
-        shift = stream(self._seed, f"adaptation {number}").random((len(cells), 2))
+    def _probe(self, cells: Cells, chosen: Int64, level: int, mean: float, near: Bool) -> _Probe:
+        """What points of each chosen cell see; near (n,): where they may be inside a solid."""
+        shift = stream(self._seed, f"adaptation {level}").random((len(cells), 2))
         seen = []
-        for k in range(count):
+        for k in range(_POINTS):
             points = Points.of_pass(cells, chosen, k, shift)
-            streams = _FIRST_STREAM + 100 * number + k
+            streams = _FIRST_STREAM + 100 * level + k
             light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
             self.rays += light.rays
             direct = light.grey
             hidden = np.zeros(len(chosen), dtype=bool)
             if self._around is not None:
-                if number == 0:
-                    some = slice(None, None, max(len(chosen) // _MEAN_POINTS, 1))
-                    total, _ = self._look(self._around, streams, Points.of_pass(cells, chosen[some], k, shift))
-                    self._mean = float(direct.mean() + total.mean())
                 # Where the sources shine nothing is hidden.
                 unlit = np.flatnonzero(near & (direct <= 0))
                 unlit = unlit[self._beneath(self._around, points.only(unlit))]
@@ -139,9 +142,7 @@ class Adaptation:
                     there = Points.of_pass(cells, chosen[unlit], k, shift)
                     total, enclosed = self._look(self._around, streams, there)
                     seen_light = partial(self._seen, self._around, 100_000_000 + streams)
-                    hidden[unlit] = out_of_sight(
-                        there, self._around, enclosed, total, direct[unlit], self._mean, seen_light
-                    )
+                    hidden[unlit] = out_of_sight(there, self._around, enclosed, total, direct[unlit], mean, seen_light)
             variance = np.sqrt(light.variance).mean(axis=1) ** 2
             seen.append((light.signature, direct, variance, hidden))
         return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
@@ -173,9 +174,9 @@ def _touching(receivers: Receivers, chosen: Bool) -> Bool:
     return np.asarray(touched[corner].any(axis=1))
 
 
-def _on_borders(receivers: Receivers, probe: _Probe, fair: float) -> Int64:
+def _on_borders(receivers: Receivers, signature: Int64, direct: Float64, hidden: Bool, fair: float) -> Int64:
     """Cells (n,) that share a vertex with hidden and open cells, or with cells that see other lights or see them in
-    part, if light differs among them by enough to matter."""
+    part, if light differs among them by enough to matter; from what one point of each cell (c,) sees, as in _Probe."""
     corner = receivers.cell_vertex
     vertices = int(corner.max()) + 1
 
@@ -189,10 +190,10 @@ def _on_borders(receivers: Receivers, probe: _Probe, fair: float) -> Int64:
             np.maximum.at(high, corner[:, k], values)
         return low, high
 
-    least, most = extremes(probe.hidden[0].astype(np.int8))
+    least, most = extremes(hidden.astype(np.int8))
     contact = (least != most)[corner].any(axis=1)
-    low, high = extremes(probe.signature[0])
+    low, high = extremes(signature)
     crossed = ((low < 0) | (low != high))[corner].any(axis=1)
-    dark, bright = extremes(probe.direct[0])
+    dark, bright = extremes(direct)
     step = (bright - dark)[corner].max(axis=1)
     return np.flatnonzero(contact | (crossed & (step**2 * receivers.cells.area > fair)))

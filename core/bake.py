@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
@@ -84,17 +85,19 @@ def bake(
         with clock.stage("transport", 0.1, until=0.28):
             halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
         surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
-        with clock.stage("tessellate", 0.28):
-            receivers, rays = finer_where_it_matters(
-                scene, receivers, direct_light, surroundings, effort, settings.seed, workers
-            )
         sampled, sky_light = direct_light, None
         if of_sky and "sky" in settings.layers:
             sampled, sky_light = (
                 DirectLight(part, visibility, settings.seed, effort.lights) for part in (others, of_sky)
             )
-        survey = Survey(receivers, sampled, surroundings, effort, settings.seed, workers, sky_light)
-        survey.rays.update(rays)
+
+        def begun_on(some: Receivers) -> Survey:
+            return Survey(some, sampled, surroundings, effort, settings.seed, workers, sky_light)
+
+        with clock.stage("tessellate", 0.28):
+            survey = finer_where_it_matters(
+                begun_on, scene, receivers, direct_light, surroundings, effort, settings.seed, workers
+            )
         baked = Baked(planned, patches, halves, survey)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))
     if memory:
@@ -122,6 +125,7 @@ def first_light(
 
 
 def finer_where_it_matters(
+    begun_on: Callable[[Receivers], Survey],
     scene: Scene,
     receivers: Receivers,
     direct_light: DirectLight,
@@ -129,17 +133,27 @@ def finer_where_it_matters(
     effort: Effort,
     seed: int,
     workers: Workers,
-) -> tuple[Receivers, dict[str, int]]:
-    """Triangles cut where light breaks, and split where it bends if they start coarse; and the rays it took to tell.
-    Meshes that are kept are sampled more finely where light breaks."""
+) -> Survey:
+    """A survey of the receivers, as `begun_on` starts one. Their triangles are cut where light breaks, and split where
+    it bends if they start coarse; meshes that are kept are sampled more finely where light breaks. There a first pass
+    tells where, which serves on."""
     contours = Contours(scene, direct_light, surroundings, seed, workers)
     if effort.coarsest > 1 and receivers.tessellated:
         bends = Bends(direct_light, surroundings, contours, effort, seed, workers)
-        receivers = bends.refine(scene, receivers, len(receivers.cells) + effort.triangles)
-        return receivers, bends.rays + contours.rays
-    limit = len(receivers.cells) + int(effort.growth * effort.triangles)
+        survey = begun_on(bends.refine(scene, receivers, len(receivers.cells) + effort.triangles))
+        survey.rays += bends.rays + contours.rays
+        return survey
+    survey = begun_on(receivers)
+    survey.run_pass()
     adaptation = Adaptation(direct_light, surroundings, seed, workers)
-    receivers = adaptation.refine_receivers(receivers, limit, effort.error)
-    if receivers.tessellated:
-        receivers = contours.cut(receivers)[0]
-    return receivers, adaptation.rays + contours.rays
+    limit = len(receivers.cells) + int(effort.growth * effort.triangles)
+    finer = adaptation.refine_receivers(survey, limit, effort.error)
+    if finer.tessellated:
+        finer = contours.cut(finer)[0]
+    if finer is not receivers:
+        first, survey = survey, begun_on(finer)
+        survey.recall(first)
+        survey.run_pass()
+        survey.rays += first.rays
+    survey.rays += adaptation.rays + contours.rays
+    return survey

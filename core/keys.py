@@ -1,4 +1,4 @@
-"""Numbers by which cells and edges are known again after others were split: where they are and which way they face."""
+"""Numbers by which points, cells and edges are known again: where they are and which way they face."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .tessellation import Int64
 _MIX = np.sqrt([2.0, 3.0, 5.0])
 
 
-def _mixed(vectors: Float64) -> Float64:
+def mixed(vectors: Float64) -> Float64:
     """A number (n,) for each of some vectors (n, 3), which hardly two of them share."""
     x, y, z = vectors.T
     return np.asarray(_MIX[0] * x + _MIX[1] * y + _MIX[2] * z)
@@ -25,8 +25,8 @@ def key(corners: Sequence[Float64] | Float64, normals: Float64) -> Float64:
 
     Sums that are not of squares would be the same for both diagonals of a square.
     """
-    squares = np.sort([_mixed(corner) ** 2 for corner in corners], axis=0)
-    return np.asarray(squares.sum(axis=0) + _mixed(normals))
+    squares = np.sort([mixed(corner) ** 2 for corner in corners], axis=0)
+    return np.asarray(squares.sum(axis=0) + mixed(normals))
 
 
 def same_cells(cells: Cells, earlier: Cells) -> tuple[Int64, Int64]:

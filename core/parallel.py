@@ -68,6 +68,11 @@ class Workers:
         # A single one is done sooner here than it is handed over.
         return self._ahead(work, calls) if len(calls) > 1 else map(work, calls)
 
+    def beside(self, *calls: Callable[[], Any]) -> list[Any]:
+        """Results of calls that do not depend on each other: while one does what only one thread can, the others go
+        on."""
+        return list(self.each(lambda call: call(), calls))
+
     def _ahead(self, work: Callable[[Any], Result], calls: list[Any]) -> Iterator[Result]:
         """Results of all calls in order, each begun only a few ahead of those that were taken."""
         under_way: deque[tuple[Future[Result], list[Any]]] = deque()

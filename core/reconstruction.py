@@ -97,6 +97,11 @@ class Samples:
         """(c, 3) how much the samples weigh at each corner."""
         return lumped_moments(self.moments)
 
+    @property
+    def mean_grey(self) -> Float64:
+        """(c,) mean light of the samples, 0 where there is none."""
+        return np.asarray(self.light.sum(axis=1) @ self.to_grey / np.maximum(self.count, 1.0))
+
     def grey(self) -> Samples:
         """The same samples of the mean light alone."""
         alone = Samples(0, np.ones(1))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from math import ceil
 from time import perf_counter
 
@@ -61,10 +62,10 @@ def refine(
     show: Callable[[Light], None],
 ) -> Light:
     """Passes until the estimated error, or the clock, says so. show: takes the light after each pass, if watched."""
-    begun = perf_counter()
+    begun, first = perf_counter(), effort.passes - survey.passes % effort.passes
     with clock.stage("gather", 0.3):
-        for number in range(effort.passes):
-            begin, end = (0.3 + 0.4 * n / effort.passes for n in (number, number + 1))
+        for number in range(first):
+            begin, end = (0.3 + 0.4 * n / first for n in (number, number + 1))
             clock.progress.report("gather", begin, until=end)
             survey.run_pass()
             if clock.progress.watched:
@@ -72,7 +73,7 @@ def refine(
         seconds = settings.seconds or np.inf
         if clock.elapsed < seconds:
             survey.refine_boundaries(effort.boundary_passes)
-    seconds_per_pass = (perf_counter() - begun) / effort.passes
+    seconds_per_pass = (perf_counter() - begun) / first
     tried: list[tuple[int, ErrorEstimate]] = []
     for round_number in range(_MOST_ROUNDS):
         begun = perf_counter()
@@ -122,13 +123,13 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
 
 def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
-    found = fit_samples(survey, scene, workers)
+    found, buried = workers.beside(partial(fit_samples, survey, scene, workers), survey.buried)
     transport = _squared_transport_error(survey, found.fits)
     error, cell_error = estimate_error(
         found.fits, transport, found.area, found.shown, found.radiance, survey.missed_sky
     )
     values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
-    return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=survey.buried())
+    return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=buried)
 
 
 def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,15 +204,15 @@ class Survey:
         self.seed = seed
         self.workers = workers
         self._shift = stream(seed, "cells").random((count, 2))
-        self._signatures: list[NDArray[np.int64]] = []
+        self.signatures: list[NDArray[np.int64]] = []
         self._extra = 0
-        self._mean = 0.0
-        #: The cells that passes look at.
-        self._fresh = np.arange(count)
+        self.mean = 0.0
+        #: The cells that were not recalled, and how many passes are for them alone.
+        self._fresh, self._recalled = np.arange(count), 0
 
     def recall(self, earlier: Survey) -> None:
-        """Before the first pass: take the samples of the cells that an earlier survey had as well, and look at the
-        others only."""
+        """Before the first pass: take the samples of the cells that an earlier survey had as well; as many passes as it
+        had will look at the others only."""
         here, there = same_cells(self.receivers.cells, earlier.receivers.cells)
         for halves, known in ((self.indirect, earlier.indirect), (self.direct, earlier.direct)):
             for samples, others in zip(halves, known, strict=True):
@@ -219,16 +220,16 @@ class Survey:
         for coarser, other in zip(self.coarser, earlier.coarser, strict=True):
             coarser[here] = other[there]
         self.invalid[here] = earlier.invalid[there]
-        for signature in earlier._signatures:
-            self._signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
-            self._signatures[-1][here] = signature[there]
-        self._mean = earlier._mean
-        self._fresh = np.setdiff1d(self._fresh, here)
+        for signature in earlier.signatures:
+            self.signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
+            self.signatures[-1][here] = signature[there]
+        self.mean = earlier.mean
+        self._shift[here] = earlier._shift[there]
+        self._fresh, self._recalled = np.setdiff1d(self._fresh, here), earlier.passes
 
-    @property
-    def _index(self) -> NDArray[np.int64] | slice:
-        """The same cells; a slice where they are all, for sums over that take no copies."""
-        return self._fresh if len(self._fresh) < len(self.invalid) else slice(None)
+    def _index(self, number: int) -> NDArray[np.int64] | slice:
+        """The cells that a pass looks at; a slice where they are all, for sums over that take no copies."""
+        return self._fresh if number < self._recalled else slice(None)
 
     @property
     def error(self) -> float:
@@ -268,46 +269,63 @@ class Survey:
         return self.direct[0].lumped + self.direct[1].lumped
 
     def run_pass(self) -> None:
-        """One more point in every cell, or in every one that was not recalled."""
-        number, fresh = self.passes, self._fresh
+        """One more point in every cell, but in those for which an earlier pass was recalled."""
+        number = self.passes
+        fresh = self._fresh if number < self._recalled else np.arange(len(self.invalid))
         self.passes += 1
-        if number == len(self._signatures):
-            self._signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
+        if number == len(self.signatures):
+            self.signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
         if not len(fresh):
             return
         points = Points.of_pass(self.receivers.cells, fresh, number, self._shift)
-        light = self._direct(points, number)
-        valid = np.ones(len(fresh), dtype=bool)
-        if self.surroundings is not None:
-            valid = self._look_around(self.surroundings, points, light, number)
+        if self.surroundings is None:
+            light, valid = self._direct(points, number), np.ones(len(fresh), dtype=bool)
+        else:
+            light, arriving = self.workers.beside(
+                partial(self._direct, points, number), partial(self._arriving, self.surroundings, points, number)
+            )
+            valid = self._add_indirect(self.surroundings, number, points, light.grey, *arriving)
         self.invalid[fresh] |= ~valid
-        self._add_direct(number, self._index, points, light, valid)
-        self._signatures[number][fresh] = light.signature
+        self._add_direct(number, self._index(number), points, light, valid)
+        self.signatures[number][fresh] = light.signature
 
-    def _look_around(self, around: Surroundings, points: Points, light: Illumination, number: int) -> Bool:
+    def _arriving(
+        self, around: Surroundings, points: Points, number: int
+    ) -> tuple[Float64, Float64, Bool, Counter[str]]:
+        """What rays from the points of a pass bring, as gather_indirect has it."""
+        table = around.tables[number % 2]
+        table = table if number < 2 else table[:, : len(around.to_grey)]
+        return gather_indirect(points, around.hemispheres, table, self.seed, number, self.workers)
+
+    def _add_indirect(
+        self,
+        around: Surroundings,
+        number: int,
+        points: Points,
+        direct: Float64,
+        arriving: Float64,
+        deviation: Float64,
+        enclosed: Bool,
+        rays: Counter[str],
+    ) -> Bool:
         """Add the indirect light at the points of a pass; which of them (n,) are in sight."""
-        half, columns = number % 2, len(around.to_grey)
-        table = around.tables[half] if number < 2 else around.tables[half][:, :columns]
-        arriving, deviation, enclosed, rays = gather_indirect(
-            points, around.hemispheres, table, self.seed, number, self.workers
-        )
+        half, columns, index = number % 2, len(around.to_grey), self._index(number)
         self.rays += rays
         values = arriving[:, :columns]
         if number < 2:
-            self.coarser[half][self._fresh] = arriving[:, columns] - values[:, around.reflected].mean(axis=1)
-        direct = light.grey
+            self.coarser[half][index] = arriving[:, columns] - values[:, around.reflected].mean(axis=1)
         total = values @ around.to_grey + direct
         if len(total) == len(self.invalid):
-            self._mean = float(total.mean())
+            self.mean = float(total.mean())
 
         def look(some: Points) -> Float64:
             seen, cast = (self._glance or around).light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
             self.rays += cast
             return seen
 
-        valid = ~out_of_sight(points, around, enclosed, total, direct, self._mean, look)
+        valid = ~out_of_sight(points, around, enclosed, total, direct, self.mean, look)
         noise = (deviation[:, :columns] @ around.to_grey) ** 2
-        self._add(self.indirect[half], self._index, points, values, noise, valid)
+        self._add(self.indirect[half], index, points, values, noise, valid)
         return valid
 
     def refine_boundaries(self, passes: int) -> None:
@@ -343,7 +361,7 @@ class Survey:
             arriving, enclosed, rays = around.look(points, self.seed, 3_000_000 + k, self.workers)
             self.rays += rays
             direct = light.grey
-            buried[element[chosen[~(enclosed & dark(arriving + direct, direct, self._mean))]]] = False
+            buried[element[chosen[~(enclosed & dark(arriving + direct, direct, self.mean))]]] = False
         return buried
 
     def _uncertain(self) -> Bool:
@@ -351,10 +369,9 @@ class Survey:
         error that is asked for."""
         cells, vertices = self.receivers.cells, self.receivers.vertices
         corner = self.receivers.corner_vertex[cells.element]
-        boundary = shadow_boundary(corner, vertices, self._signatures)
+        boundary = shadow_boundary(corner, vertices, self.signatures)
         samples = self.direct[0].grey() + self.direct[1].grey()
-        count = np.maximum(samples.count, 1.0)
-        mean = samples.light.sum(axis=1)[:, 0] / count
+        count, mean = np.maximum(samples.count, 1.0), samples.mean_grey
         variance = np.maximum(samples.squares / count - mean**2, 0.0) / count
         # Two equal samples prove little, so a cell is as uncertain as those around it.
         around = np.bincount(corner.ravel(), np.repeat(variance, 3), vertices) / np.bincount(

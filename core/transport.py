@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -148,10 +149,8 @@ def solve_halves(
         return ()
     if not plan.active("bounces"):
         patches = replace(patches, albedo=np.zeros_like(patches.albedo), transmission=None)
-    return tuple(
-        make_transport(patches, visibility, direct_light, sky, plan.effort, workers, seed=seed, purpose=half)
-        for half in HALVES
-    )
+    given = patches, visibility, direct_light, sky, plan.effort, workers
+    return tuple(workers.beside(*(partial(make_transport, *given, seed=seed, purpose=half) for half in HALVES)))
 
 
 def make_transport(
