@@ -7,7 +7,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 from .blas import one_thread
 from .progress import Progress
@@ -75,26 +75,48 @@ class Workers:
 
     def _ahead(self, work: Callable[[Any], Result], calls: list[Any]) -> Iterator[Result]:
         """Results of all calls in order, each begun only a few ahead of those that were taken."""
-        under_way: deque[tuple[Future[Result], list[Any]]] = deque()
+        under_way: deque[_Call] = deque()
         # One of the threads does itself what no other has begun: all could be waiting for each other.
         helps = getattr(self._here, "is_one", False)
 
-        def begin(call: Any) -> tuple[Future[Result], list[Any]]:
-            # Whoever does it takes it out: the pool does not let go of what was cancelled.
-            box = [call]
-            return self._pool.submit(lambda: work(box.pop())), box
-
         def taken() -> Result:
-            future, box = under_way.popleft()
-            return work(box.pop()) if helps and future.cancel() else future.result()
+            first = under_way.popleft()
+            for call in (first, *under_way) if helps else ():
+                if first.done():
+                    break
+                call.run()
+            return cast(Result, first.result())
 
         try:
             for call in calls:
                 if len(under_way) == _AHEAD * self.threads:
                     yield taken()
-                under_way.append(begin(call))
+                under_way.append(_Call(work, call))
+                self._pool.submit(under_way[-1].run)
             while under_way:
                 yield taken()
         finally:
-            for future, _ in under_way:
-                future.cancel()
+            for left in under_way:
+                left.drop()
+
+
+class _Call(Future[Any]):
+    """A call of work with an argument, to be done by whoever comes first."""
+
+    def __init__(self, work: Callable[[Any], Any], argument: Any) -> None:
+        super().__init__()
+        self._work, self._argument = work, [argument]
+
+    def run(self) -> None:
+        """Do it, unless it was begun or dropped."""
+        try:
+            argument = self._argument.pop()  # of two threads one finds it
+        except IndexError:
+            return
+        try:
+            self.set_result(self._work(argument))
+        except BaseException as error:  # noqa: BLE001 - whoever takes the result gets it
+            self.set_exception(error)
+
+    def drop(self) -> None:
+        self._argument.clear()

@@ -173,7 +173,7 @@ class _Triangles:
 
     def __init__(self, corners: Float64) -> None:
         self._scene = EmbreeScene(_device(), robust=True)
-        vertices, triangles = _indexed(corners.astype(np.float32))
+        vertices, triangles = indexed(corners.astype(np.float32))
         # The binding reads items one by one, tuples four times as fast as rows of an array.
         rows = np.empty(len(triangles), dtype=object)
         rows[:] = list(zip(*triangles.T.tolist(), strict=True))
@@ -197,7 +197,7 @@ def _device() -> EmbreeDevice:
     return EmbreeDevice()
 
 
-def _indexed(corners: Float32) -> tuple[Float32, Int64]:
+def indexed(corners: Float32) -> tuple[Float32, Int64]:
     """Vertices (v, 3) and triangles (t, 3) with these corners (t, 3, 3): each point once."""
     points = corners.reshape(-1, 3)
     _, first, same = np.unique(mixed(points.astype(np.float64)), return_index=True, return_inverse=True)

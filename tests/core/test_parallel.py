@@ -107,3 +107,15 @@ with Workers({threads}, Progress()) as workers:
     assert list(workers.each(inner, (10, 20, 30))) == [[ten + one for one in range(9)] for ten in (10, 20, 30)]
 """
     subprocess.run([sys.executable, "-c", nested], check=True, timeout=20)
+
+
+def test_calls_beside_each_other_share_the_threads():
+    """Each chunk waits for one of the other's: if a call waited for its first chunk while it has another to do, or for
+    the other call, both would wait for ever."""
+    both = threading.Barrier(2, timeout=5)
+    with Workers(2, Progress()) as workers:
+
+        def call(name: str) -> str:
+            return name + "".join(workers.map(lambda number, _: str(both.wait() * 0 + number), 3, 1))
+
+        assert workers.beside(lambda: call("a"), lambda: call("b")) == ["a012", "b012"]

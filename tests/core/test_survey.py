@@ -72,3 +72,13 @@ def test_nothing_is_left_to_look_at_where_all_is_recalled(surveyed, workers):
     again.run_pass()
     assert not again.rays
     assert np.array_equal(again.direct[0].light, first.direct[0].light)
+
+
+def test_after_the_recalled_passes_every_cell_is_looked_at_again(surveyed):
+    """At new places: the sequence of points in a recalled cell goes on where the earlier survey's has stopped."""
+    first, second, _, _ = surveyed
+    here, there = same_cells(second.receivers.cells, first.receivers.cells)
+    first.run_pass()
+    second.run_pass()
+    assert (second.valid_samples == 3).all()
+    assert np.array_equal(second.direct[0].moments[here], first.direct[0].moments[there])

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.sampling import triangle_points
-from radiosity_baker.core.visibility import OFFSET, Visibility, offset_along
+from radiosity_baker.core import visibility
+from radiosity_baker.core.visibility import OFFSET, Visibility, indexed, offset_along
 
 
 def single(*rows):
@@ -91,3 +92,18 @@ def test_any_number_of_scenes_at_a_time(build):
     scenes = [Visibility(square) for _ in range(1500)]
     down = single([0, 0, -1])
     assert all(scene.nearest(single([0.7, 0.2, 2]), down) >= 0 for scene in scenes)
+
+
+def test_each_point_is_handed_over_once(build):
+    corners = corners_of(build.box("box", (0, 0, 0), (1, 1, 1))).astype(np.float32)
+    vertices, triangles = indexed(corners)
+    assert (vertices.shape, triangles.shape) == ((8, 3), (12, 3))
+    assert np.array_equal(vertices[triangles], corners)
+
+
+def test_points_with_one_key_stay_apart(build, monkeypatch):
+    """Light would go through what is left of triangles whose corners became one."""
+    monkeypatch.setattr(visibility, "mixed", lambda points: np.zeros(len(points)))
+    corners = corners_of(build.quad()).astype(np.float32)
+    vertices, triangles = indexed(corners)
+    assert np.array_equal(vertices[triangles], corners)
