@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.sampling import triangle_points
 from radiosity_baker.core import visibility
+from radiosity_baker.core.sampling import triangle_points
 from radiosity_baker.core.visibility import OFFSET, Visibility, indexed, offset_along
 
 
