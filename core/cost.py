@@ -57,13 +57,15 @@ class Work:
 @dataclass(frozen=True)
 class Machine:
     """How fast this machine is on one scene. ray: seconds that all threads together need for one; number: seconds that
-    one thread needs to sort one; closed: share of the rays that meet something; onward: that go on from there."""
+    one thread needs to sort one; closed: share of the rays that meet something; onward: that go on from there;
+    reflected: mean over the rays of the albedo of what they meet, which is the share of all light that has bounced."""
 
     ray: float
     number: float
     closed: float
     threads: int
     onward: float = 0.0
+    reflected: float = 0.0
 
     def seconds(self, work: Work) -> float:
         looks, factors = work.gather + work.shadow, work.transport * self.closed
@@ -91,7 +93,9 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
         traced = _fastest(lambda: list(workers.map(lambda *_: visibility.nearest(*rays), threads, 1)))
     ordered = _fastest(lambda: np.sort(numbers))
     met = np.mean(hit >= 0)
-    return Machine(traced / (threads * _CALIBRATION), ordered / _CALIBRATION, float(met), threads, float(onward))
+    reflected = np.where(hit >= 0, patches.albedo.mean(axis=1)[patches.patch[hit]], 0.0).mean()
+    ray, number = traced / (threads * _CALIBRATION), ordered / _CALIBRATION
+    return Machine(ray, number, float(met), threads, float(onward), float(reflected))
 
 
 def _fastest(work: Callable[[], object]) -> float:

@@ -39,6 +39,8 @@ REST = "the rest"
 _COARSEST = 16.0
 #: Triangles and patches below which a bake shows next to nothing.
 _FEWEST = 1500
+#: Lights that each half of the rays asks at a point, at least, where there are too many.
+_FEWEST_LIGHTS = 7
 #: Choosing among many emitting triangles costs as much as this many lamps.
 _TREE_COST = 8
 #: Relative errors that sampling leaves after two passes, and the triangles, with as many rays and on as many cells as
@@ -57,6 +59,9 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 4_000, 1.75
+#: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
+#: is less of the whole.
+_TYPICAL_DIRECT = 0.5
 #: Finding that takes so many rounds at most, passes over all cells in each, and rays of each point that look around.
 BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
 #: Each round has a fit, of fewer cells than there are in the end; contours take so many points for each cell.
@@ -168,6 +173,7 @@ def thriftier(effort: Effort, steps: int) -> Effort:
         transport_rays=max(8 * int(effort.transport_rays * rays / 8), 16),
         gather_rays=max(2 * int(effort.gather_rays * rays / 2), 8),
         shadow_rays=max(2 * int(effort.shadow_rays * rays / 2), 2),
+        lights=max(int(effort.lights * rays), min(effort.lights, _FEWEST_LIGHTS)),
         boundary_passes=max(2 * int(effort.boundary_passes * rays / 2), 2),
     )
 
@@ -236,15 +242,20 @@ class _Prices:
         asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            return self._coarse(effort) + min(_called(effort.error), effort.triangles)
+            return self._coarse(effort) + self._called(effort)
         return planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
+
+    def _called(self, effort: Effort) -> float:
+        """Cells that are added where light bends."""
+        straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
+        return float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
 
     def _coarse(self, effort: Effort) -> int:
         return self._count(max(int(effort.triangles / effort.coarsest), 1))
 
     def _surveyed(self, effort: Effort) -> float:
         """Points that tell where light bends."""
-        cells = self._coarse(effort) + min(_called(effort.error), effort.triangles) / 2.0
+        cells = self._coarse(effort) + self._called(effort) / 2.0
         return _rounds(effort) * BEND_PASSES * cells
 
     def _works(self, planned: Plan) -> dict[str, Work]:
@@ -298,10 +309,6 @@ class _Prices:
 
 def _rounds(effort: Effort) -> float:
     return min(1.0 + 0.2 / effort.error, BEND_ROUNDS) if effort.coarsest > 1.0 else 0.0
-
-
-def _called(error: float) -> float:
-    return float(_CALLED * (0.02 / error) ** _CALLED_POWER)
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:

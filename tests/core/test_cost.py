@@ -21,6 +21,9 @@ def test_the_machine_is_measured_on_the_scene(build):
     room = calibrate(Pilot(Scene((build.box(inward=True),), (build.grey,))), 2)
     assert open_floor.closed < 0.01
     assert room.closed > 0.99
+    # Both are grey, and nothing comes back to the floor.
+    assert room.reflected == pytest.approx(0.5, abs=0.01)
+    assert open_floor.reflected < 0.01
     assert (open_floor.threads, room.threads) == (1, 2)
     assert min(room.ray, room.number, open_floor.ray) > 0
 

@@ -11,7 +11,7 @@ from radiosity_baker.core.bake import bake
 from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, gather_rays, plan, plan_with_prices
+from radiosity_baker.core.plan import LOOKING, gather_rays, plan, plan_with_prices, thriftier
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
@@ -185,6 +185,26 @@ def test_less_time_makes_less_of_everything_but_what_the_mesh_has(build, monkeyp
     assert hurried.cells >= len(dense.objects[0].triangles)
     one, two = (plan(dense, Settings(error=None, seconds=s)).effort for s in (0.5, 0.7))
     assert one.gather_rays <= two.gather_rays
+
+
+def test_less_time_asks_fewer_of_many_lamps(build):
+    """As many as are enough for a rough bake, and no more than there were."""
+    effort = build.effort(lights=24)
+    fewer = [thriftier(effort, steps).lights for steps in (1, 5, 24)]
+    assert effort.lights > fewer[0] > fewer[1] >= fewer[2] == 7
+    assert thriftier(replace(effort, lights=7), 24).lights == 7
+    assert thriftier(replace(effort, lights=3), 24).lights == 3
+
+
+def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):
+    """In a white room nearly all light has bounced, and is smooth; where a typical share has not, or more, the typical
+    number is called for."""
+    room, seconds = build.furnished_room(), {}
+    for reflected in (0.0, 0.5, 0.75, 0.95):
+        machine = Machine(3e-7, 1e-8, 1.0, 1, reflected=reflected)
+        monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_, machine=machine: machine)
+        seconds[reflected] = plan(room, Settings(error=0.02)).seconds
+    assert seconds[0.0] == seconds[0.5] > seconds[0.75] > seconds[0.95]
 
 
 def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, monkeypatch):
