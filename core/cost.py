@@ -26,7 +26,7 @@ _CALIBRATION = 1 << 13
 _LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 600.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 50.0, 600.0, 1500.0, 3300.0, 4000.0, 1300.0
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 25.0, 600.0, 900.0, 3300.0, 4000.0, 850.0
 #: Of any bake, however small, and of any round of finding where light bends.
 _FIXED, _ROUND = 1.5e7, 1.2e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
