@@ -59,6 +59,8 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 4_000, 1.75
+#: Cells that triangles which are kept gain at most where light breaks, for each cell.
+_MOST_CROSSED = 0.25
 #: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
 #: is less of the whole.
 _TYPICAL_DIRECT = 0.5
@@ -243,7 +245,8 @@ class _Prices:
         effort = planned.effort
         if effort.coarsest > 1.0:
             return self._coarse(effort) + self._called(effort)
-        return planned.cells + min(0.01 / effort.error * planned.cells, effort.growth * effort.triangles)
+        crossed = 0.01 / effort.error if self._settings.tessellate else min(0.01 / effort.error, _MOST_CROSSED)
+        return planned.cells + min(crossed * planned.cells, effort.growth * effort.triangles)
 
     def _called(self, effort: Effort) -> float:
         """Cells that are added where light bends."""
