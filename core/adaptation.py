@@ -28,8 +28,8 @@ from .tessellation import Int64
 
 #: How often a cell is split into four at most.
 LEVELS = 4
-#: The same inside a triangle that is kept. A linear element leaves a sixteenth of a jump, squared. The two of four pieces
-#: that it crosses leave a twelfth each, by two samples 2 / 4**2 / 12 / 2 in all: a twelfth of that, so nothing shows.
+#: The same inside a triangle that is kept. A linear element leaves a sixteenth of a jump, squared; the two of its four
+#: pieces that it crosses leave a twelfth each, with two samples 2 / 4**2 / 12 / 2 in all: a twelfth of that.
 KEPT_LEVELS = 1
 #: How far light may jump inside a cell before anyone looks more closely, relative to the mean and to the error asked
 #: for: few cells are crossed, and what the fit leaves of a jump is a fraction of it.
