@@ -20,7 +20,7 @@ from .direct.illumination import DirectLight
 from .direct.lamps import place
 from .parallel import Workers
 from .receivers import cell_colours
-from .refinement import Light, fit_alone, mean_reflected, refine
+from .refinement import Light, fit_alone, refine
 from .report import mean_energy
 from .result import BakeResult
 from .scene import LAMP_COLOUR, Float64, Lamp, Scene
@@ -214,5 +214,5 @@ def _response(baked: Baked, name: str, alphas: tuple[Float64, ...], workers: Wor
 def _brightness(baked: Baked, light: Light) -> float:
     """Mean reflected radiance on the receivers, W/(m^2 sr)."""
     receivers = baked.survey.receivers
-    arriving = (light.lamps + light.reflected + light.emitted + light.sky).mean(axis=1)
-    return mean_reflected(receivers, cell_colours(baked.plan.scene, receivers), arriving)
+    reflected = cell_colours(baked.plan.scene, receivers).albedo * receivers.at_cells(light.arriving) / np.pi
+    return float(receivers.cells.area @ reflected.mean(axis=1) / receivers.cells.area.sum())

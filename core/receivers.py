@@ -86,7 +86,7 @@ class Receivers:
         return np.asarray(total / np.maximum(around, np.finfo(float).tiny))
 
     def at_cells(self, values: Float64) -> Float64:
-        """Means (c,) of values (v,) at the fit vertices around each cell."""
+        """Means (c, ...) of values (v, ...) at the fit vertices around each cell."""
         return np.asarray(values[self.corner_vertex[self.cells.element]].mean(axis=1))
 
     @cached_property

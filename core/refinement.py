@@ -14,12 +14,11 @@ from .accuracy import COARSENING, UNKNOWN, ErrorEstimate, Fitted, estimate_error
 from .clock import Clock
 from .parallel import Workers
 from .plan import Effort
-from .receivers import Receivers, cell_colours
+from .receivers import cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
 from .settings import Settings
 from .survey import Survey
-from .textures import Colours
 from .transport import in_three_channels
 
 #: Squared sampling error, relative to that of the rest, which no longer shows beside it.
@@ -50,6 +49,11 @@ class Light:
     filled: Bool
     hidden: Bool
     buried: Bool
+
+    @property
+    def arriving(self) -> Float64:
+        """All of the irradiance (v, 3), from wherever."""
+        return self.lamps + self.reflected + self.emitted + self.sky
 
 
 def refine(
@@ -128,8 +132,7 @@ def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     error, cell_error = estimate_error(
         found.fits, transport, found.area, found.shown, found.radiance, survey.missed_sky
     )
-    values, alphas = [f.values for f in found.fits], tuple(f.alpha for f in found.fits)
-    return replace(_light(survey, values, alphas, error, cell_error, found.fit), buried=buried)
+    return replace(found.light, error=error, cell_error=cell_error, buried=buried)
 
 
 def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
@@ -144,12 +147,12 @@ def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
 
 @dataclass(frozen=True, eq=False)
 class FittedSurvey:
-    """The fits of direct and, if any, indirect light on one structure. area (c,): of the cells, as far as they are in
-    sight; shown (c,): mean square over the channels of albedo / pi, what a squared error of the irradiance counts;
-    radiance: the mean, W/(m^2 sr)."""
+    """The fits of direct and, if any, indirect light on one structure, and the light that they are, with nothing known
+    of its error. area (c,): of the cells, as far as they are in sight; shown (c,): what a squared error of the mean
+    irradiance counts in this light, mean square over the channels; radiance: the mean, W/(m^2 sr)."""
 
-    fit: Fit
     fits: list[Fitted]
+    light: Light
     area: Float64
     shown: Float64
     radiance: float
@@ -161,17 +164,22 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     fit = Fit(receivers, survey.lumped, survey.invalid)
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
-    area, shown = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
+    area, white = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
     in_sight = area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
 
     def fitted(halves: list[Samples]) -> Fitted:
-        return fit_halves(fit, halves, in_sight, shown, loose, workers.each)
+        return fit_halves(fit, halves, in_sight, white, loose, workers.each)
 
     fits = list(workers.each(fitted, sampled))
-    reflected = mean_reflected(receivers, colours, np.sum([fitted.grey for fitted in fits], axis=0))
-    emitted = float(area @ colours.emission.mean(axis=1) / area.sum())
-    return FittedSurvey(fit, fits, in_sight, shown, emitted + reflected)
+    light = _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), UNKNOWN, np.zeros(len(area)), fit)
+    arriving = receivers.at_cells(light.arriving)
+    # An error is of the colour of the light: in red light a red surface shows all of it, a blue one nothing.
+    grey = arriving.mean(axis=1, keepdims=True)
+    tint = np.divide(arriving, grey, out=np.ones_like(arriving), where=grey > 0.0)
+    shown = np.mean((tint * colours.albedo / np.pi) ** 2, axis=1)
+    radiance = colours.emission + colours.albedo * arriving / np.pi
+    return FittedSurvey(fits, light, in_sight, shown, float(area @ radiance.mean(axis=1) / area.sum()))
 
 
 def fit_alone(survey: Survey, alphas: tuple[Float64, ...]) -> Light:
@@ -236,11 +244,3 @@ def _light(
         hidden=fit.hidden & ~fit.filled if fit else nowhere,
         buried=np.zeros(len(survey.receivers.element_corners), dtype=bool),
     )
-
-
-def mean_reflected(receivers: Receivers, colours: Colours, irradiance: Float64) -> float:
-    """Mean radiance, W/(m^2 sr), over the receivers and the channels, that cells of these colours reflect of the mean
-    irradiance (v,) at the vertices."""
-    cells = receivers.cells
-    reflected = colours.albedo.mean(axis=1) * receivers.at_cells(irradiance)
-    return float(cells.area @ reflected / cells.area.sum() / np.pi)

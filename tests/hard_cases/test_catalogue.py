@@ -483,6 +483,31 @@ def test_what_no_ray_has_found_may_be_there(size, told):
     assert not any("Portal" in warning for warning in lit.warnings)
 
 
+def glowing_sheets(channels: int) -> Scene:
+    """A small tetrahedron on a sheet whose halves are a needle and a large triangle, all of them glowing and reflecting
+    in so many channels: as a random scene was, split."""
+    faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    small = triangles("small", [(0, 0.75, 0.25), (0.25, 0.75, 0.25), (0, 1, 0.25), (0, 0.75, 0.5)], faces)
+    corners = [(0, 0.5, 0), (0.92983, 0.77715, -0.24207), (0.92959, 0.77811, -0.24191), (-0.24207, 1.45615, 0.16489)]
+    lit = np.arange(3) < channels
+    return Scene(
+        (small, triangles("sheet", corners, [[0, 1, 2], [0, 2, 3]])),
+        (Surface("glowing", tuple(0.2 * lit), tuple(1.0 * lit)),),
+    )
+
+
+def test_stated_error_of_red_light_on_red_surfaces(told):
+    """The same rays, the same error in red, and none in green and blue, where nothing is: over the channels the root
+    mean square is sqrt(3) times as large as where all three are alike, relative to their mean. Catches errors judged as
+    if light and surfaces were white: beside what glows they were stated a third as large. Found by a random scene."""
+    stated = []
+    for channels in (3, 1):
+        settings = Settings(triangles=30, error=None, tessellate=False, effects={"colour": True})
+        effort = replace(choose_effort(glowing_sheets(channels), settings), patches=30, gather_rays=8, channels=3)
+        stated.append(bake(glowing_sheets(channels), settings, effort=effort).report.estimated_error["total"])
+    told("stated error of red light on red surfaces", np.sqrt(3), stated[1] / stated[0], 1e-3 * np.sqrt(3))
+
+
 LAMPS_NEAR = {
     "on the floor": PointLamp("lamp", (0.5, 0.5, 0.0), (1.0,) * 3),
     "1e-4 over the floor": PointLamp("lamp", (0.5, 0.5, 1e-4), (1.0,) * 3),
