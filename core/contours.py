@@ -167,7 +167,8 @@ class Contours:
         source = np.arange(len(receivers.cells))
         if self._nothing_to_find:
             return receivers, source
-        near = self._borders(receivers)
+        sight = self._sight_of_cells(receivers)
+        near = self._borders(receivers, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         contoured = np.zeros(len(source), dtype=bool)
         for _ in range(_PASSES):
@@ -181,15 +182,16 @@ class Contours:
             contoured |= np.isfinite(found.place)[number].any(axis=1)
             receivers, piece = cut_cells(receivers, place[number])
             near, contoured, source = np.isfinite(place[number]).any(axis=1)[piece], contoured[piece], source[piece]
-        if contoured.any():
-            receivers = replace(receivers, breaks=self._breaks(receivers, contoured))
-        return receivers, source
+        return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
 
-    def _borders(self, receivers: Receivers) -> Bool:
-        """Cells (c,) with others around them that have other lights in sight, or that are covered."""
-        cells, corner = receivers.cells, receivers.cell_vertex
-        points = Points(cells, np.arange(len(cells)), np.full((len(cells), 3), 1 / 3))
-        sight = self._sight(points, GAP * points.size)
+    def _sight_of_cells(self, receivers: Receivers) -> Int64:
+        """What is in sight (c,) of the middle of each cell."""
+        points = _middles(receivers)
+        return self._sight(points, GAP * points.size)
+
+    def _borders(self, receivers: Receivers, sight: Int64) -> Bool:
+        """Cells (c,) with others around them that have other lights in sight (c,), or that are covered."""
+        cells, corner, points = receivers.cells, receivers.cell_vertex, _middles(receivers)
         low, high = np.full((2, int(corner.max()) + 1), sight[0])
         for k in range(3):
             low[corner[:, k]] = high[corner[:, k]] = sight
@@ -327,24 +329,40 @@ class Contours:
         hidden, open_ = (enclosed | near).reshape(2, -1), ~(enclosed | far).reshape(2, -1)
         return _Look(arriving.reshape(2, -1), (hidden & open_[::-1]).any(axis=0))
 
-    def _breaks(self, receivers: Receivers, near: Bool) -> Bool:
-        """Sides (c, 3) of near (c,) cells with a light that is in sight as a whole on one side and hidden on the other,
-        with an outline between them, or with something that stands between them."""
+    def _breaks(self, receivers: Receivers, near: Bool, sight: Int64) -> Bool | None:
+        """Sides (c, 3) of cells with a light that is in sight as a whole on one side and hidden on the other, with an
+        outline between them, or with something that stands between them; None without any.
+
+        They are looked for between near (c,) cells, and between those that have something else in sight (c,): a contour
+        may run along their sides, and cross none.
+        """
         here, there = shared_edges(receivers.cell_vertex)
-        both = near[here[:, 0] // 3] & near[there[:, 0] // 3]
+        one, other = here[:, 0] // 3, there[:, 0] // 3
+        both = (near[one] & near[other]) | _part(sight[one], sight[other])
         if not both.any():
-            return np.zeros((len(near), 3), dtype=bool)
+            return None
         side = np.concatenate([here[both, 0], _side(there[both])])
         weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
         weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
         points = Points(receivers.cells, side // 3, weights)
         one, other = self._sight(points, None).reshape(2, -1)
-        jumps = (one >> _WHOLE & ~other | other >> _WHOLE & ~one) & ((1 << _WHOLE) - 1)
         parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
-        broken = (jumps > 0) | parted | self._look(points, GAP * points.size, 1).outlines
+        broken = _part(one, other) | parted | self._look(points, GAP * points.size, 1).outlines
         breaks = np.zeros(3 * len(near), dtype=bool)
         breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
+
+
+def _middles(receivers: Receivers) -> Points:
+    """The middle of each cell."""
+    count = len(receivers.cells)
+    return Points(receivers.cells, np.arange(count), np.full((count, 3), 1 / 3))
+
+
+def _part(one: Int64, other: Int64) -> Bool:
+    """Whether a light is in sight as a whole on one side and hidden on the other, or one of them is covered: (n,)."""
+    lights = (1 << _WHOLE) - 1
+    return np.asarray(((one >> _WHOLE & ~other | other >> _WHOLE & ~one) & lights | (one ^ other) & _COVERED) > 0)
 
 
 def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:

@@ -21,6 +21,8 @@ from .visibility import LOST, Visibility, offset_along
 CHUNK_RAYS = 65536
 #: Rays of all patterns together, and how many there are at least.
 _PATTERN_RAYS, _FEWEST_PATTERNS = 16384, 256
+#: A turn about a normal that seldom runs along a wall.
+_ASKEW = 1.0
 
 
 @dataclass(frozen=True)
@@ -125,14 +127,28 @@ class Hemispheres:
         return ~self._visibility.unblocked_along(offset_along(points, normals), ways)
 
     def beneath(self, points: Float64, normals: Float64, reach: Float64) -> Bool:
-        """Whether each point (n, 3) is under something: its back is straight above, or it is within reach (n,). No
-        others can be inside a solid or a gap. Takes two rays of each point."""
+        """Whether each point (n, 3) is under something: it may be inside a solid, or something is straight above within
+        reach (n,). No others can be in a gap. Takes two rays of each point, and a third below what shows its front."""
         return self.inside(points, normals) | self.covered(points, normals, reach)
 
     def inside(self, points: Float64, normals: Float64) -> Bool:
-        """Whether what lies straight above each point (n, 3) shows its back: it may be inside a solid."""
-        directions = normals.astype(np.float32)
-        hit = self._visibility.nearest(offset_along(points, normals), directions)
+        """Whether what lies above each point (n, 3) shows its back, so that it may be inside a solid: straight above,
+        or to this side and to that. For in a solid that reaches up to a ceiling a ray meets the one or the other by
+        chance."""
+        origins, up = offset_along(points, normals), normals.astype(np.float32)
+        hit = self._visibility.nearest(origins, up)
+        inside = self._back(hit, up)
+        doubtful = np.flatnonzero((hit >= 0) & ~inside)
+        aside = frames(up[doubtful], np.full(len(doubtful), _ASKEW, dtype=np.float32))[:, 0]
+        for sign in (1, -1):
+            ways = up[doubtful] + sign * aside
+            back = self._back(self._visibility.nearest(origins[doubtful], ways), ways)
+            doubtful, aside = doubtful[back], aside[back]
+        inside[doubtful] = True
+        return inside
+
+    def _back(self, hit: Int32, directions: Float32) -> Bool:
+        """Whether each ray has met the back of a patch."""
         return np.asarray((hit >= 0) & (self._sides(hit, directions) >= self.codes.patches))
 
     def _sides(self, hit: Int32, directions: Float32) -> Int32:

@@ -98,6 +98,18 @@ def test_what_stands_on_the_floor_is_dark_beneath_and_not_beside(seed):
     assert values[depth < -cell / 4].max() == 0.0
 
 
+def test_the_fit_breaks_where_a_shadow_ends_along_sides_of_cells():
+    """The floor is split at x = 0 at once, and there the shadow begins: it crosses no edge."""
+    sail = quad("sail", (0, -1.1, 0.5), (1.1, 0, 0), (0, 2.2, 0), surface=1, receives=False)
+    scene = Scene((FLOOR, sail), (GREY, BLACK), (SunLamp("sun", (0, 0, -1), (1.0,) * 3),))
+    baked = bake(scene, Settings(triangles=2000, threads=2)).objects[0]
+    across, light = baked.vertices[baked.triangles][..., 0], baked.layers["combined"][..., 0]
+    lit, shaded = across.max(axis=1) < 1e-9, across.min(axis=1) > -1e-9
+    assert (lit | shaded).all()
+    assert light[lit] == pytest.approx(LIT, rel=1e-6)
+    assert light[shaded] == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize("thickness", [0.0, 1e-3])
 def test_no_light_leaks_through_a_thin_wall(thickness):
     """Two rooms with a lamp in one: right beside the wall, the other is a hundred times as dark as the first."""

@@ -6,6 +6,8 @@ stratified). Everything here is asked to lie within four of them.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from radiosity_baker.core.form_factors.hemisphere import hemisphere_rows, site_p
 from radiosity_baker.core.hemisphere import Codes, Hemispheres
 from radiosity_baker.core.sampling import stream
 from radiosity_baker.core.scene import Scene, Surface
+from radiosity_baker.core.shapes import box
 from radiosity_baker.core.visibility import Visibility
 
 SIX = tuple(Surface(str(k), (0.1 * (k + 1),) * 3) for k in range(6))
@@ -197,3 +200,13 @@ def test_fewer_rays_look_at_the_same_surroundings(build):
     patches = build.patches(Scene((build.box(inward=True),), SIX), 100)
     few = looker(patches, 64).with_rays(8, stream(0, "few"))
     assert few.cast(np.zeros((5, 3)), np.tile(UP, (5, 1)), np.tile(UP, (5, 1)), stream(0, "rays")).code.shape == (5, 8)
+
+
+def test_a_pillar_that_reaches_up_to_the_ceiling_is_a_solid(build):
+    """Straight above the floor in it lie its own top, which shows its back, and the ceiling, which shows its front."""
+    room, pillar = box("room", (-2, -2, 0), (2, 2, 3)), box("pillar", (-0.3, -0.3, 0), (0.3, 0.3, 3))
+    room = replace(room, triangles=room.triangles[:, ::-1].copy())
+    patches = build.patches(Scene((room, pillar), SIX), 2)
+    points = np.column_stack([np.random.default_rng(0).uniform(-0.6, 0.6, (200, 2)), np.zeros(200)])
+    inside = looker(patches, 16).inside(patches.space.normalise(points), np.tile(UP, (200, 1)))
+    assert np.array_equal(inside, (np.abs(points[:, :2]) < 0.3).all(axis=1))
