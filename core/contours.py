@@ -333,8 +333,8 @@ class Contours:
         """Sides (c, 3) of cells with a light that is in sight as a whole on one side and hidden on the other, with an
         outline between them, or with something that stands between them; None without any.
 
-        They are looked for between near (c,) cells, and between others that have something else in sight (c,): a contour
-        may run along their sides, and cross none.
+        They are looked for between near (c,) cells, and between others that have something else in sight (c,): a
+        contour may run along their sides, and cross none.
         """
         here, there = shared_edges(receivers.cell_vertex)
         one, other = here[:, 0] // 3, there[:, 0] // 3
