@@ -98,6 +98,7 @@ def bake(
             survey = finer_where_it_matters(
                 begun_on, scene, receivers, direct_light, surroundings, effort, settings.seed, workers
             )
+            del receivers  # large meshes need the room
         baked = Baked(planned, patches, halves, survey)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))
     if memory:
@@ -153,7 +154,8 @@ def finer_where_it_matters(
     if finer is not receivers:
         first, survey = survey, begun_on(finer)
         survey.recall(first)
-        survey.run_pass()
         survey.rays += first.rays
+        del first  # before it needs room for more
+        survey.run_pass()
     survey.rays += adaptation.rays + contours.rays
     return survey

@@ -7,12 +7,14 @@ import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, Self, TypeVar, cast
+from functools import partial
+from typing import Any, Self, TypeAlias, TypeVar
 
 from .blas import one_thread
 from .progress import Progress
 
 Result = TypeVar("Result")
+_Task: TypeAlias = Callable[[], None]
 
 #: Calls for each thread that are handed over ahead of those whose results were taken. When Blender quits, Python waits
 #: for all that were handed over, and takes no more.
@@ -75,48 +77,47 @@ class Workers:
 
     def _ahead(self, work: Callable[[Any], Result], calls: list[Any]) -> Iterator[Result]:
         """Results of all calls in order, each begun only a few ahead of those that were taken."""
-        under_way: deque[_Call] = deque()
+        under_way: deque[tuple[Future[Result], list[_Task]]] = deque()
         # One of the threads does itself what no other has begun: all could be waiting for each other.
         helps = getattr(self._here, "is_one", False)
 
+        def begin(call: Any) -> None:
+            # The pool holds nothing but the box: large results must not wait with it until a thread has time.
+            future: Future[Result] = Future()
+            under_way.append((future, [partial(_fulfil, future, work, call)]))
+            self._pool.submit(_open, under_way[-1][1])
+
         def taken() -> Result:
-            first = under_way.popleft()
-            for call in (first, *under_way) if helps else ():
-                if first.done():
+            future, box = under_way.popleft()
+            for other, theirs in ((future, box), *under_way) if helps else ():
+                if other.done():
                     break
-                call.run()
-            return cast(Result, first.result())
+                _open(theirs)
+            return future.result()
 
         try:
             for call in calls:
                 if len(under_way) == _AHEAD * self.threads:
                     yield taken()
-                under_way.append(_Call(work, call))
-                self._pool.submit(under_way[-1].run)
+                begin(call)
             while under_way:
                 yield taken()
         finally:
-            for left in under_way:
-                left.drop()
+            for _, box in under_way:
+                box.clear()
 
 
-class _Call(Future[Any]):
-    """A call of work with an argument, to be done by whoever comes first."""
+def _open(box: list[_Task]) -> None:
+    """Do the task in a box, unless it was taken out by whoever came first."""
+    try:
+        task = box.pop()
+    except IndexError:
+        return
+    task()
 
-    def __init__(self, work: Callable[[Any], Any], argument: Any) -> None:
-        super().__init__()
-        self._work, self._argument = work, [argument]
 
-    def run(self) -> None:
-        """Do it, unless it was begun or dropped."""
-        try:
-            argument = self._argument.pop()  # of two threads one finds it
-        except IndexError:
-            return
-        try:
-            self.set_result(self._work(argument))
-        except BaseException as error:  # noqa: BLE001 - whoever takes the result gets it
-            self.set_exception(error)
-
-    def drop(self) -> None:
-        self._argument.clear()
+def _fulfil(future: Future[Result], work: Callable[[Any], Result], argument: Any) -> None:
+    try:
+        future.set_result(work(argument))
+    except BaseException as error:  # noqa: BLE001 - whoever takes the result gets it
+        future.set_exception(error)
