@@ -21,12 +21,14 @@ from .scene import SceneError
 
 #: Rays, and numbers, that measure how fast this machine is.
 _CALIBRATION = 1 << 13
+#: Of these, rays from one point: as in a bake, where one after the other starts there.
+_LOOKS = 8
 #: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers, of one that
 #: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
-_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 60.0, 600.0
+_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 60.0, 30.0, 600.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 25.0, 600.0, 900.0, 3300.0, 4000.0, 850.0
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 15.0, 400.0, 900.0, 3300.0, 4000.0, 850.0
 #: Of any bake, however small, and of any round of finding where light bends.
 _FIXED, _ROUND = 1.5e7, 1.2e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
@@ -81,7 +83,8 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     threads = thread_count(threads)
     patches, visibility = pilot.patches, pilot.visibility
     rng = stream(0, "calibration")
-    chosen = rng.choice(len(patches.area), size=_CALIBRATION, p=patches.area / patches.area.sum())
+    chosen = rng.choice(len(patches.area), size=_CALIBRATION // _LOOKS, p=patches.area / patches.area.sum())
+    chosen = np.repeat(chosen, _LOOKS)
     directions = rng.normal(size=(_CALIBRATION, 3))
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True) + patches.normals[chosen]
     origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]

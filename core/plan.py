@@ -58,7 +58,7 @@ _MORE_PATCHES = 1.6
 _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
-_CALLED, _CALLED_POWER = 4_000, 1.75
+_CALLED, _CALLED_POWER = 8_000, 1.75
 #: Cells that triangles which are kept gain at most where light breaks, for each cell.
 _MOST_CROSSED = 0.25
 #: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
