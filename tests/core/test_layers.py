@@ -65,7 +65,8 @@ def test_unreached_is_loud_inside_solids_only(build, run):
     assert not loud[within > 1.0 + edge].any()
     assert np.unique(colours[~loud]).tolist() == [np.float32(0.05)]
     assert result.report.vertices["hidden"] > 0
-    assert result.report.vertices["filled"] > 0
+    # Along the outline it has vertices of its own: nothing of what is seen reaches under the box.
+    assert result.report.vertices["filled"] == 0
 
 
 def test_each_triangle_has_a_colour_of_its_own(build, run):
