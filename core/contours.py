@@ -167,8 +167,9 @@ class Contours:
         source = np.arange(len(receivers.cells))
         if self._nothing_to_find:
             return receivers, source
-        sight = self._sight_of_cells(receivers)
-        near = self._borders(receivers, sight)
+        middles = Points(receivers.cells, source, np.full((len(source), 3), 1 / 3))
+        sight = self._sight(middles, GAP * middles.size)
+        near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         contoured = np.zeros(len(source), dtype=bool)
         for _ in range(_PASSES):
@@ -184,14 +185,9 @@ class Contours:
             near, contoured, source = np.isfinite(place[number]).any(axis=1)[piece], contoured[piece], source[piece]
         return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
 
-    def _sight_of_cells(self, receivers: Receivers) -> Int64:
-        """What is in sight (c,) of the middle of each cell."""
-        points = _middles(receivers)
-        return self._sight(points, GAP * points.size)
-
-    def _borders(self, receivers: Receivers, sight: Int64) -> Bool:
-        """Cells (c,) with others around them that have other lights in sight (c,), or that are covered."""
-        cells, corner, points = receivers.cells, receivers.cell_vertex, _middles(receivers)
+    def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
+        """Cells (c,) with others around them from whose middles other lights are in sight (c,), or that are covered."""
+        cells, corner = receivers.cells, receivers.cell_vertex
         low, high = np.full((2, int(corner.max()) + 1), sight[0])
         for k in range(3):
             low[corner[:, k]] = high[corner[:, k]] = sight
@@ -200,7 +196,7 @@ class Contours:
             np.maximum.at(high, corner[:, k], sight)
         near = (low != high)[corner].any(axis=1)
         for k in range(3):
-            near |= self._barred(points, cells.corners[:, k])
+            near |= self._barred(middles, cells.corners[:, k])
         return np.asarray(near)
 
     def _follow(self, receivers: Receivers, edges: _Edges, number: Int64, near: Bool) -> _Crossings:
@@ -351,12 +347,6 @@ class Contours:
         breaks = np.zeros(3 * len(near), dtype=bool)
         breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
-
-
-def _middles(receivers: Receivers) -> Points:
-    """The middle of each cell."""
-    count = len(receivers.cells)
-    return Points(receivers.cells, np.arange(count), np.full((count, 3), 1 / 3))
 
 
 def _part(one: Int64, other: Int64) -> Bool:

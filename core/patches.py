@@ -13,7 +13,7 @@ import numpy as np
 
 from .optics import Optics, make_optics, stopping_share
 from .scene import Bool, Float32, Float64, Int32, Scene, SceneObject
-from .sorting import distinct, stable_order
+from .sorting import distinct, renumbered, stable_order
 from .tessellation import Int64, Tessellation, edge_for_count, triform, whole
 from .textures import Colours, constant_colours, even_points, mean_colours, varies
 
@@ -176,7 +176,7 @@ def make_patches(scene: Scene, space: Space, split: PatchMeshes, like: Patches |
     centre = (grouped[:, 0] + grouped[:, 1] + grouped[:, 2]) / 3.0  # four times as fast as a mean over so short an axis
     cube, facing = np.floor(centre / (0.8 * edge[small])[:, None]), np.rint(normals[small] * 1.5)
     alike = np.column_stack([number[small], surface[small], halvings[small], cube, facing]).astype(np.int64)
-    patch = _renumbered(group_alike(len(area), small, alike))
+    patch = renumbered(group_alike(len(area), small, alike))
     members = stable_order(patch).astype(np.int32)
     count = int(patch.max()) + 1
     patch_surface = np.empty(count, dtype=np.int32)
@@ -262,13 +262,6 @@ def group_alike(count: int, chosen: Int64, key: Int64) -> Int64:
         _, first, same = distinct(row_numbers(key))
         group[chosen] = chosen[first][same]
     return group
-
-
-def _renumbered(labels: Int64) -> Int32:
-    """The labels (n,) counted through without gaps, in their order."""
-    used = np.zeros(int(labels.max()) + 1, dtype=np.int32)
-    used[labels] = 1
-    return (np.cumsum(used, dtype=np.int32) - 1)[labels]
 
 
 def row_numbers(key: Int64) -> Int64:

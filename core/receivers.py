@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .patches import Cells, Space, shading_normals, triangle_geometry
 from .scene import Bool, Float64, Int32, Scene, SceneObject
 from .settings import Settings
-from .sorting import distinct, stable_order
+from .sorting import distinct, renumbered, stable_order
 from .tessellation import (
     Int64,
     Tessellation,
@@ -245,11 +245,8 @@ def fit_vertices(
             joined &= np.abs(placed[here[:, end]] - placed[there[:, end]]).max(axis=1) < _SAME_PLACE
     if breaks is not None:
         joined &= ~breaks.ravel()[here[:, 0]]
-    label = _components(corner.size, here[joined].reshape(-1), there[joined].reshape(-1))
-    used = np.zeros(corner.size, dtype=np.int32)
-    used[label] = 1
-    number = np.cumsum(used, dtype=np.int32) - 1
-    return number[label].reshape(-1, 3), int(used.sum())
+    number = renumbered(_components(corner.size, here[joined].reshape(-1), there[joined].reshape(-1)))
+    return number.reshape(-1, 3), int(number.max(initial=-1)) + 1
 
 
 def shared_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:

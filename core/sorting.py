@@ -1,4 +1,5 @@
-"""Whole numbers sorted together with where they stand: several times as fast as places sorted by what stands there."""
+"""Whole numbers in order: sorted together with where they stand, several times as fast as places sorted by what stands
+there, and counted through."""
 
 from __future__ import annotations
 
@@ -29,3 +30,10 @@ def distinct(numbers: NDArray[Any]) -> tuple[NDArray[Any], NDArray[np.int64], ND
     inverse[order] = np.cumsum(fresh) - 1
     first = order[fresh]
     return numbers[first], first, inverse
+
+
+def renumbered(labels: NDArray[Any]) -> NDArray[np.int32]:
+    """The labels (n,) counted through without gaps, in their order."""
+    used = np.zeros(int(labels.max(initial=-1)) + 1, dtype=np.int32)
+    used[labels] = 1
+    return (np.cumsum(used, dtype=np.int32) - 1)[labels]

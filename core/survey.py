@@ -271,7 +271,8 @@ class Survey:
     def run_pass(self) -> None:
         """One more point in every cell, but in those for which an earlier pass was recalled."""
         number = self.passes
-        fresh = self._fresh if number < self._recalled else np.arange(len(self.invalid))
+        index = self._index(number)
+        fresh = np.arange(len(self.invalid))[index]
         self.passes += 1
         if number == len(self.signatures):
             self.signatures.append(np.zeros(len(self.invalid), dtype=np.int64))
@@ -284,10 +285,10 @@ class Survey:
             light, arriving = self.workers.beside(
                 partial(self._direct, points, number), partial(self._arriving, self.surroundings, points, number)
             )
-            valid = self._add_indirect(self.surroundings, number, points, light.grey, *arriving)
-        self.invalid[fresh] |= ~valid
-        self._add_direct(number, self._index(number), points, light, valid)
-        self.signatures[number][fresh] = light.signature
+            valid = self._add_indirect(self.surroundings, number, index, points, light.grey, *arriving)
+        self.invalid[index] |= ~valid
+        self._add_direct(number, index, points, light, valid)
+        self.signatures[number][index] = light.signature
 
     def _arriving(
         self, around: Surroundings, points: Points, number: int
@@ -301,6 +302,7 @@ class Survey:
         self,
         around: Surroundings,
         number: int,
+        index: NDArray[np.int64] | slice,
         points: Points,
         direct: Float64,
         arriving: Float64,
@@ -309,7 +311,7 @@ class Survey:
         rays: Counter[str],
     ) -> Bool:
         """Add the indirect light at the points of a pass; which of them (n,) are in sight."""
-        half, columns, index = number % 2, len(around.to_grey), self._index(number)
+        half, columns = number % 2, len(around.to_grey)
         self.rays += rays
         values = arriving[:, :columns]
         if number < 2:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 
@@ -149,8 +148,11 @@ def solve_halves(
         return ()
     if not plan.active("bounces"):
         patches = replace(patches, albedo=np.zeros_like(patches.albedo), transmission=None)
-    given = patches, visibility, direct_light, sky, plan.effort, workers
-    return tuple(workers.beside(*(partial(make_transport, *given, seed=seed, purpose=half) for half in HALVES)))
+
+    def solved(half: str) -> Transport:
+        return make_transport(patches, visibility, direct_light, sky, plan.effort, workers, seed=seed, purpose=half)
+
+    return tuple(workers.each(solved, HALVES))
 
 
 def make_transport(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.sorting import distinct, stable_order
+from radiosity_baker.core.sorting import distinct, renumbered, stable_order
 
 
 @pytest.mark.parametrize("most", [1, 7, 2**40, 2**62])
@@ -22,3 +22,9 @@ def test_distinct_numbers_first_places_and_inverse(kind):
     found, expected = distinct(numbers), np.unique(numbers, return_index=True, return_inverse=True)
     assert all(np.array_equal(one, other) for one, other in zip(found, expected, strict=True))
     assert found[0].dtype == kind
+
+
+@pytest.mark.parametrize("count", [0, 300])
+def test_labels_are_counted_through_without_gaps(count):
+    labels = np.random.default_rng(3).integers(0, 500, count)
+    assert np.array_equal(renumbered(labels), np.unique(labels, return_inverse=True)[1])
