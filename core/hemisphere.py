@@ -65,6 +65,8 @@ class Hemispheres:
     tells rays that leave the scene apart.
     """
 
+    BURIED_RAYS = 5
+
     def __init__(
         self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator, sky: Sky = DARK
     ) -> None:
@@ -146,6 +148,22 @@ class Hemispheres:
             doubtful, aside = doubtful[back], aside[back]
         inside[doubtful] = True
         return inside
+
+    def buried(self, points: Float64, normals: Float64, within: Bool) -> Bool:
+        """Whether points (n, 3) lie inside a solid: of five ways, straight up and slanting to four sides, all but one
+        end at a back, or at a side that is known to be within a solid, by its code (c,). A ceiling may be the one.
+
+        Takes BURIED_RAYS rays of each.
+        """
+        origins, up = offset_along(points, normals), normals.astype(np.float32)
+        turned = frames(up, np.full(len(up), _ASKEW, dtype=np.float32))
+        ends = np.zeros(len(up), dtype=np.int64)
+        for along, across in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
+            ways = up + along * turned[:, 0] + across * turned[:, 1]
+            hit = self._visibility.nearest(origins, ways)
+            code = self._sides(hit, ways)
+            ends += (hit >= 0) & (self.codes.of_backs(code) | within[code])
+        return np.asarray(ends >= self.BURIED_RAYS - 1)
 
     def _back(self, hit: Int32, directions: Float32) -> Bool:
         """Whether each ray has met the back of a patch."""

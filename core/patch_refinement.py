@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from .direct.illumination import DirectLight, Source
-from .form_factors.hemisphere import SITES, site_points
+from .form_factors.sides import SITES, site_points
 from .parallel import Workers
 from .patches import Patches, PatchMeshes, Space, make_patches, split_objects
 from .pilot import Pilot

@@ -15,8 +15,9 @@ from .bake import bake
 from .closed_forms import FormFactor, KnownLight, form_factors, known_light
 from .form_factors.analytic import analytic_rows
 from .form_factors.centroid import centroid_rows
-from .form_factors.hemisphere import Sides, hemisphere_rows
+from .form_factors.hemisphere import hemisphere_rows
 from .form_factors.rows import Rows
+from .form_factors.sides import Sides
 from .parallel import Workers
 from .patches import Patches, make_patches, split_objects, triangle_geometry, unit_space
 from .plan import choose_effort

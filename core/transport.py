@@ -10,8 +10,9 @@ import numpy as np
 from .direct.illumination import DirectLight
 from .form_factors.analytic import analytic_rows
 from .form_factors.centroid import centroid_rows
-from .form_factors.hemisphere import Opening, Sides, hemisphere_rows
+from .form_factors.hemisphere import Opening, hemisphere_rows
 from .form_factors.rows import Rows, balance, one_sided, symmetric_exchange
+from .form_factors.sides import SITES, Sides
 from .parallel import Workers
 from .patches import Patches, coarser_groups
 from .plan import Effort, Plan
@@ -292,9 +293,7 @@ def light_on_sides(
         rng = stream(seed, "light on sides " + purpose, number)
         normals = sides.normals[part].reshape(-1, 3)
         light = direct_light.at(sides.points[part].reshape(-1, 3), normals, normals, shadow_rays, rng)
-        seen = ~sides.hidden[part]
-        total = np.einsum("snk,sn->sk", light.irradiance.reshape(*seen.shape, 3), seen)
-        return total / seen.sum(axis=1)[:, None], light.rays
+        return light.irradiance.reshape(-1, SITES, 3).mean(axis=1), light.rays
 
     irradiance, rays = zip(*workers.map(work, len(sides.side), _CHUNK), strict=True)
     return np.concatenate(irradiance), sum(rays, Counter())

@@ -15,66 +15,14 @@ from numpy.typing import NDArray
 from ..hemisphere import Codes, Hemispheres
 from ..parallel import Workers
 from ..patches import Patches
-from ..sampling import GOLDEN, plane_points, stream, triangle_points
+from ..sampling import stream
 from ..scene import Bool, Float32, Float64, Int32
 from ..sky import DARK, Sky
 from ..visibility import Visibility
 from .rows import Rows
-
-#: Points of a patch from which its rays start.
-SITES = 4
-#: Shares of rays that meet backs, of a point inside a solid and of one that is surely not.
-_INSIDE, _OUTSIDE = 0.95, 0.6
+from .sides import SITES, Sides, even_sides, open_parts
 
 Index = NDArray[np.int64]
-
-
-@dataclass(frozen=True, eq=False)
-class Sides:
-    """The sides of patches that can exchange light: every front, and each back that some ray can reach.
-
-    side (s,) int32: patch index for a front, patch index + number of patches for a back. points, normals (s, SITES, 3)
-    where light is sampled on each; hidden (s, SITES): inside a solid that stands on the patch, while the rest of the
-    patch is open.
-    """
-
-    patches: Patches
-    side: Int32
-    points: Float64
-    normals: Float64
-    hidden: Bool
-
-    @property
-    def patch(self) -> Int32:
-        return self.side % np.int32(len(self.patches))
-
-    @property
-    def back(self) -> Bool:
-        return self.side >= len(self.patches)
-
-    @property
-    def area(self) -> Float64:
-        """(s,) in the unit box, of the open part on which rays stop."""
-        open_area = self.patches.patch_area[self.patch] * (1.0 - self.hidden.mean(axis=1))
-        return open_area if self.patches.coverage is None else open_area * self.patches.coverage[self.patch]
-
-    @property
-    def albedo(self) -> Float32:
-        return self.patches.albedo[self.patch]
-
-    @property
-    def emission(self) -> Float32:
-        return self.patches.emission_of(self.side)
-
-    def transmitted(self, irradiance: Float64) -> Float64:
-        """Radiosity (s, 3) from irradiance (s, 3) on the other side of each patch; 0 if nothing transmits."""
-        transmission = self.patches.transmission
-        if transmission is None:
-            return np.zeros_like(irradiance)
-        through = np.zeros((2 * len(self.patches), irradiance.shape[1]))
-        through[self.side] = irradiance
-        other = (self.side + len(self.patches)) % (2 * len(self.patches))
-        return np.asarray(transmission[self.patch] * through[other])
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,23 +51,6 @@ class Exchanged(NamedTuple):
     rays: Counter[str]
 
 
-def site_points(patches: Patches, side: Int32, shift: Float64) -> tuple[Float64, Float64]:
-    """Points and normals (s, SITES, 3) spread evenly over the area of each side, all moved by shift (s, 1, 3)."""
-    patch = side % np.int32(len(patches))
-    first, last = patches.first[patch, None], patches.first[patch + 1, None]
-    cumulative = np.concatenate([[0.0], np.cumsum(patches.area[patches.members])])
-    number = np.arange(SITES)
-    # The member that a point falls on, by area; the sequence is even over the members as well.
-    share = (number * GOLDEN + shift[..., 2]) % 1.0
-    wanted = cumulative[first] + share * (cumulative[last] - cumulative[first])
-    position = np.clip(np.searchsorted(cumulative, wanted, side="right") - 1, first, last - 1)
-    triangle = patches.members[position]
-    weights = triangle_points(plane_points(np.broadcast_to(number, share.shape), shift[..., :2]))
-    points = np.einsum("snc,snck->snk", weights, patches.corners[triangle])
-    turned = np.where(side >= len(patches), -1.0, 1.0)[:, None, None]
-    return points, patches.normals[triangle] * turned
-
-
 def hemisphere_rows(
     patches: Patches, visibility: Visibility, workers: Workers, *, rays: int, seed: int, purpose: str, sky: Sky = DARK
 ) -> Exchanged:
@@ -133,36 +64,45 @@ def hemisphere_rows(
     fresh = _first_sides(patches)
     met = np.zeros(2 * count, dtype=bool)
     met[fresh] = True
+    cast_of_each = SITES * hemispheres.rays
     looks: list[_Look] = []
+    cast = Counter[str]()
     while len(fresh):
-        looks.append(_look_around(patches, fresh, hemispheres, workers, seed, f"{purpose} {len(looks)}"))
+        name = f"{purpose} {len(looks)}"
+        look = _look_around(even_sides(patches, fresh, seed, name), hemispheres, workers, seed, name)
+        cast["transport"] += len(fresh) * rays
+        partly, contact = open_parts(look.sides(patches), look.behind, look.met_by, hemispheres, seed, name)
+        cast += contact
+        if len(partly.side):
+            anew = _look_around(partly, hemispheres, workers, seed, f"{name} open")
+            look = _Look.joined([look.without(partly.side), anew])
+            cast["transport"] += len(partly.side) * rays
+        looks.append(look)
         reached = np.zeros(2 * count, dtype=bool)
-        reached[looks[-1].column] = True
+        reached[look.column] = True
         fresh = np.flatnonzero(reached & ~met).astype(np.int32)
         met |= reached
-    look = _Look(*(np.concatenate([getattr(part, f.name) for part in looks]) for f in fields(_Look)))
-    sides = Sides(patches, look.side, look.points, look.normals, look.hidden)
+    look = _Look.joined(looks)
+    sides = look.sides(patches)
     number = np.full(2 * count, -1, dtype=np.int32)
     number[look.side] = np.arange(len(look.side), dtype=np.int32)
-    counted = (~look.hidden).sum(axis=1) * hemispheres.rays
     pointers = np.concatenate([[0], np.cumsum(look.length)]).astype(np.int64)
     columns = number[look.column]
     # One column of hits for each channel, or one for all.
-    weights = np.atleast_2d(look.hits.T / np.repeat(counted, look.length)).astype(np.float32)
+    weights = np.atleast_2d(look.hits.T / cast_of_each).astype(np.float32)
     rows = tuple(Rows(pointers, columns, channel) for channel in weights)
-    cast = Counter(transport=len(look.side) * rays)
     if patches.optics is None:
-        opening = Opening(look.escaped / counted, look.skylight / counted[:, None])
+        opening = Opening(look.escaped / cast_of_each, look.skylight / cast_of_each)
         return Exchanged(sides, (_mutual(rows[0], sides),), opening, np.zeros(len(look.side)), None, cast)
-    escaped = (look.escaped.T / counted).T
+    escaped = look.escaped / cast_of_each
     found = escaped + np.stack([r.row_sums() for r in rows], axis=1).reshape(escaped.shape)
     if patches.optics.tinted:
         # A few rays whose tints are over one, as others' are under it, may bring more than all there is.
         over = np.maximum(found, 1.0)
         escaped, found = escaped / over, found / over
-    opening = Opening(escaped, look.skylight / counted[:, None])
+    opening = Opening(escaped, look.skylight / cast_of_each)
     lost = 1.0 - found
-    glints = np.pi * look.glints / counted[:, None] if look.glints.any() else None
+    glints = np.pi * look.glints / cast_of_each if look.glints.any() else None
     cast += Counter({"onward": int(look.onward.sum()), "cut off": int(look.cut.sum())})
     rows = tuple(_mutual(matrix, sides) for matrix in rows)
     return Exchanged(sides, rows, opening, np.maximum(lost, 0.0), glints, cast)
@@ -180,14 +120,16 @@ def _first_sides(patches: Patches) -> Int32:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What the rays of some sides met: the sides with their sites, how many entries each has, the side met (global
-    number), the hits on it and the rays that escaped, tinted (., 3) if anything is; the sum of the light that these
-    brought (s, k); emission (s, 3) seen in mirrors; and for each chunk the rays that went on, and those cut off."""
+    """What the rays of some sides met: the sides as in Sides, the share of each site's rays that met backs, how many
+    entries each has, the side met (global number), the hits on it and the rays that escaped, tinted (., 3) if anything
+    is; the sum of the light that these brought (s, k); emission (s, 3) seen in mirrors; and for each chunk the rays
+    that went on, and those cut off."""
 
     side: Int32
     points: Float64
     normals: Float64
-    hidden: Bool
+    open_share: Float64
+    behind: Float64
     length: Index
     column: Int32
     hits: Index | Float64
@@ -197,29 +139,41 @@ class _Look:
     onward: Index
     cut: Index
 
+    def sides(self, patches: Patches) -> Sides:
+        return Sides(patches, self.side, self.points, self.normals, self.open_share)
 
-def _look_around(
-    patches: Patches, side: Int32, hemispheres: Hemispheres, workers: Workers, seed: int, purpose: str
-) -> _Look:
+    @staticmethod
+    def joined(looks: list[_Look]) -> _Look:
+        return _Look(*(np.concatenate([getattr(part, f.name) for part in looks]) for f in fields(_Look)))
+
+    def met_by(self, chosen: Bool) -> Bool:
+        """Which of the sides (s,) the chosen (s,) ones met."""
+        return np.isin(self.side, self.column[np.repeat(chosen, self.length)])
+
+    def without(self, side: Int32) -> _Look:
+        """The same, but for what some of the sides met."""
+        kept = ~np.isin(self.side, side)
+        of_entries = dict.fromkeys(("column", "hits"), np.repeat(kept, self.length))
+        of_all = dict.fromkeys(("onward", "cut") if len(self.glints) else ("onward", "cut", "glints"), slice(None))
+        chosen = of_entries | of_all
+        return _Look(*(getattr(self, f.name)[chosen.get(f.name, kept)] for f in fields(_Look)))
+
+
+def _look_around(sides: Sides, hemispheres: Hemispheres, workers: Workers, seed: int, purpose: str) -> _Look:
+    patches = sides.patches
     codes = hemispheres.codes
     light = hemispheres.sky.light
-    points, normals = site_points(patches, side, stream(seed, "sites " + purpose).random((len(side), 1, 3)))
     tinted = patches.optics is not None and patches.optics.tinted
     glows = patches.optics is not None and bool(patches.emission.any())
 
     def work(number: int, part: slice) -> tuple[Any, ...]:
         rng = stream(seed, "rows " + purpose, number)
-        origins, axes = points[part].reshape(-1, 3), normals[part].reshape(-1, 3)
+        origins, axes = sides.points[part].reshape(-1, 3), sides.normals[part].reshape(-1, 3)
         looks = hemispheres.cast(origins, axes, axes, rng)
         met = looks.code.reshape(-1, SITES, hemispheres.rays)
-        hidden = _hidden(codes.of_backs(met).mean(axis=2))
-        if patches.transmission is not None:
-            # Both sides of what transmits are coupled patch by patch, so both are open.
-            hidden &= ~(patches.transmission[side[part] % len(patches)] > 0.0).any(axis=1)[:, None]
+        behind = codes.of_backs(met).mean(axis=2)
         # The codes of sides are their numbers; here it is all one by which texel a ray escaped.
-        columns = np.minimum(met, codes.escaped)
-        columns[hidden] = codes.lost
-        columns = columns.reshape(len(met), -1)
+        columns = np.minimum(met, codes.escaped).reshape(len(met), -1)
         tint = None if looks.tint is None else looks.tint.reshape(*columns.shape, 3)
         glints = np.zeros((len(met) if glows else 0, 3))
         if glows and looks.mirrored is not None:
@@ -233,11 +187,11 @@ def _look_around(
         if not tinted:
             columns.sort(axis=1)
         entries = _tinted_lengths(columns, tint, codes) if tinted else _run_lengths(columns, codes)
-        return hidden, *entries, skylight, glints, np.array([looks.onward]), np.array([looks.cut])
+        return behind, *entries, skylight, glints, np.array([looks.onward]), np.array([looks.cut])
 
     chunk = max(1, hemispheres.chunk // SITES)
-    parts = zip(*workers.map(work, len(side), chunk), strict=True)
-    return _Look(side, points, normals, *(np.concatenate(p) for p in parts))
+    parts = zip(*workers.map(work, len(sides.side), chunk), strict=True)
+    return _Look(sides.side, sides.points, sides.normals, sides.open_share, *(np.concatenate(p) for p in parts))
 
 
 def _light_of_escaped(light: Float32, texel: Int32, escaped: Bool, tint: Float32 | None) -> Float64:
@@ -248,15 +202,6 @@ def _light_of_escaped(light: Float32, texel: Int32, escaped: Bool, tint: Float32
         brought *= tint[escaped]
     sums = [np.bincount(side, channel, len(texel)) for channel in brought.T]
     return np.stack(sums, axis=1) if sums else np.zeros((len(texel), 0))
-
-
-def _hidden(behind: Float64) -> Bool:
-    """Sites (n, SITES) of a patch that lie inside a solid while others do not, by their share of rays that meet backs.
-
-    Such a patch runs under an object that stands on it; only its open part takes part in the exchange of light.
-    """
-    inside, outside = behind > _INSIDE, behind < _OUTSIDE
-    return np.asarray(inside & outside.any(axis=1, keepdims=True))
 
 
 def _run_lengths(columns: Int32, codes: Codes) -> tuple[Index, Int32, Index, Index]:
@@ -292,7 +237,7 @@ def _mutual(rows: Rows, sides: Sides) -> Rows:
 
     With few rays most sides that see each other are found from one of them only, so this is asked nowhere else.
     """
-    partly, back = sides.hidden.any(axis=1), sides.back
+    partly, back = sides.open_share < 1.0, sides.back
     owner, column = rows.owners(), rows.columns.astype(np.int64)
     doubtful = np.flatnonzero(back[owner] & (partly & ~back)[column])
     if not len(doubtful):

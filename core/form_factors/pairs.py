@@ -19,8 +19,9 @@ from ..sampling import stream
 from ..scene import Bool, Float64
 from ..sky import Sky
 from ..visibility import Visibility, offset_along
-from .hemisphere import Opening, Sides, hemisphere_rows
+from .hemisphere import Opening, hemisphere_rows
 from .rows import Rows
+from .sides import Sides
 
 Index = NDArray[np.int64]
 

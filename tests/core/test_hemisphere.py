@@ -11,7 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from radiosity_baker.core.form_factors.hemisphere import hemisphere_rows, site_points
+from radiosity_baker.core.form_factors.hemisphere import hemisphere_rows
+from radiosity_baker.core.form_factors.sides import site_points
 from radiosity_baker.core.hemisphere import Codes, Hemispheres
 from radiosity_baker.core.sampling import stream
 from radiosity_baker.core.scene import Scene, Surface

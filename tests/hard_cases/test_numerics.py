@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.form_factors.hemisphere import Sides, hemisphere_rows
+from radiosity_baker.core.form_factors.hemisphere import hemisphere_rows
 from radiosity_baker.core.form_factors.rows import Rows, balance, symmetric_exchange
+from radiosity_baker.core.form_factors.sides import Sides
 from radiosity_baker.core.parallel import Workers
 from radiosity_baker.core.patches import make_patches, split_objects, unit_space
 from radiosity_baker.core.progress import Progress
