@@ -2,8 +2,9 @@
 
 Rays that leave a room by chance find a small window too seldom. Those that do cross the plane of the wall inside the
 hole. So the planes with the most surface are candidates: where escaping rays cross one close together, the rectangle
-around them becomes a portal if most rays that are aimed at it escape too. Any set of portals gives the same light, so
-a bad choice costs rays and nothing else.
+around them becomes a portal if most rays that are aimed at it escape too, and few of those that are aimed past it. For
+any set of portals gives the same light, but not in the same parts: what lies before a portal gets the sky through it
+straight, what lies behind it does not, and where a surface runs on through its plane, both parts break.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import numpy as np
 from .patches import Patches, Space, row_numbers
 from .pilot import Escapes, Pilot
 from .sampling import stream
-from .scene import Float64, Portal, Vector
+from .scene import Bool, Float64, Portal, Vector
 from .sky import Rectangle
 from .tessellation import Int64
 from .visibility import Visibility
@@ -31,8 +32,12 @@ _FLAT = 2e-3
 _WITHIN = 1.05
 #: Share of the rays aimed at an opening that must escape; rays that tell; openings at most.
 _FREE, _TRIALS, _MOST = 0.4, 512, 8
-#: Share of the rays which must have left by the openings for the rest to be left to chance.
-_MOST_OF_IT = 0.95
+#: A rim this much larger than an opening is part of its frame, if at most this share of the rays that the opening lets
+#: through get through there; how many of the four sides must have one.
+_RIM, _FRAMED, _SIDES = 1.06, 0.5, 3
+#: Share of the rays which must have left by the openings for the rest to be left to chance; and for them to be worth it:
+#: so that at most half of the noise is left.
+_MOST_OF_IT, _WORTHWHILE = 0.95, 0.75
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +68,8 @@ class _Plane:
 
 
 def find_openings(escapes: Escapes, pilot: Pilot) -> tuple[Portal, ...]:
-    """The openings that rays from inside rooms escaped through, the one that brings the most first. Rays that cross a
-    portal which the scene has already are left out."""
+    """The openings that rays from inside rooms escaped through, the one that brings the most first; none where many
+    escaped by other ways. Rays that cross a portal which the scene has already are left out."""
     patches, space = pilot.patches, pilot.patches.space
     for portal in pilot.scene.portals:
         own = Rectangle.of(portal, space)
@@ -83,6 +88,8 @@ def find_openings(escapes: Escapes, pilot: Pilot) -> tuple[Portal, ...]:
             break
         openings.append(best)
         left = left.only(~best.crossed(left.origins.T, left.directions.T))
+    if len(left) > (1.0 - _WORTHWHILE) * len(escapes):
+        return ()
     return tuple(_portal(f"Opening {number}", opening, space) for number, opening in enumerate(openings, start=1))
 
 
@@ -175,15 +182,25 @@ def _to_edges(plane: _Plane, place: Float64, patches: Patches) -> tuple[Float64,
 
 
 def _free_share(rectangle: Rectangle, through: Escapes, visibility: Visibility) -> float:
-    """Share of the rays from some origins to places all over the rectangle that escape; 0 if that is too few."""
+    """Share of the rays from some origins to places all over the rectangle that escape; 0 if that is too few, or if
+    there is no frame around it."""
     rng = stream(0, "free share")
     origins = through.origins[rng.integers(len(through), size=_TRIALS)]
+
+    def free(place: Float64) -> Bool:
+        """Whether the rays to places (_TRIALS, 2), the rectangle's are from -1 to 1, escape."""
+        ways = rectangle.center + place @ np.stack([rectangle.half_u, rectangle.half_v]) - origins
+        ways *= 8.0 / np.linalg.norm(ways, axis=1, keepdims=True)
+        return visibility.unblocked_along(origins, ways.astype(np.float32))
+
     place = 2.0 * rng.random((_TRIALS, 2)) - 1.0
-    targets = rectangle.center + place @ np.stack([rectangle.half_u, rectangle.half_v])
-    ways = targets - origins
-    ways *= 8.0 / np.linalg.norm(ways, axis=1, keepdims=True)
-    free = float(visibility.unblocked_along(origins, ways.astype(np.float32)).mean())
-    return free if free >= _FREE else 0.0
+    share = float(free(place).mean())
+    if share < _FREE:
+        return 0.0
+    side, each = np.arange(_TRIALS) % 4, np.arange(_TRIALS)
+    place[each, side // 2] = (2.0 * (side % 2) - 1.0) * (1.0 + (_RIM - 1.0) * rng.random(_TRIALS))
+    past = np.bincount(side, free(place)) / np.bincount(side)
+    return share if np.count_nonzero(past <= _FRAMED * share) >= _SIDES else 0.0
 
 
 def _portal(name: str, opening: Rectangle, space: Space) -> Portal:
