@@ -35,7 +35,7 @@ _FREE, _TRIALS, _MOST = 0.4, 512, 8
 #: A rim this much larger than an opening is part of its frame, if at most this share of the rays that the opening lets
 #: through get through there; how many of the four sides must have one.
 _RIM, _FRAMED, _SIDES = 1.06, 0.5, 3
-#: Share of the rays which must have left by the openings for the rest to be left to chance; and for them to be worth it:
+#: Share of the rays which must have left by the openings for the rest to be left to chance; and for them to be of use:
 #: so that at most half of the noise is left.
 _MOST_OF_IT, _WORTHWHILE = 0.95, 0.75
 

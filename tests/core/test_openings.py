@@ -84,7 +84,7 @@ def test_windows_beside_each_other_and_across_are_told_apart(build):
 
 
 def test_between_things_that_stand_in_the_open_there_is_no_window(build):
-    """Stairs against two walls: rays from what they hide leave through the plane of a step, and beside it, and above."""
+    """Stairs against two walls: rays from what they hide leave through the plane of a step, beside it and above."""
     ground = build.box("ground", (-3, -3, -0.2), (3, 3, 0))
     walls = build.box("back", (-3, 3, 0), (3, 3.2, 3)), build.box("left", (-3.2, -3, 0), (-3, 3.2, 3))
     stairs = [build.box(f"step {k}", (1.2, 1 + 0.45 * k, 0), (2.6, 1.45 + 0.45 * k, 0.22 * (k + 1))) for k in range(4)]
