@@ -14,7 +14,7 @@ All are root mean squares over the receivers' surface, relative to the mean radi
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any
 
@@ -89,11 +89,28 @@ def fit_halves(
     (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
     a squared error of the light there counts. loose: how many times as far as usual fits may be from the best. each: a
     `map` that may use threads."""
-    to_grey = halves[0].to_grey
     limits, together = fit.limits(*halves), fit.system(*halves)
+    judged = _cross_validate(fit, halves, limits, area, shown, loose, each)
+    start = _in_colour(judged.grey, fit.averages(together), halves[0].to_grey)
+    light = fit.solve_within(together, judged.alpha, limits, start, loose, each)
+    return replace(judged, values=light, grey=light @ halves[0].to_grey)
+
+
+def _cross_validate(
+    fit: Fit,
+    halves: list[Samples],
+    limits: tuple[Float64, Float64],
+    area: Float64,
+    shown: Float64,
+    loose: float,
+    each: Callable[..., Any],
+) -> Fitted:
+    """As `fit_halves`, but the values are still those of the mean light alone: half of what both halves have."""
+    to_grey = halves[0].to_grey
     grey = list(each(Samples.grey, halves))
     systems = list(each(fit.system, grey))
     tried: list[_Halves] = []
+    told: list[Float64] = []
     best = [fit.averages(system) for system in systems]
     smoother = fit.measured
     level = np.zeros(len(smoother), dtype=np.int8)
@@ -104,21 +121,23 @@ def fit_halves(
         # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
         low, high = (limit @ to_grey for limit in within(limits, alpha))
         first, second = (np.clip(v[:, 0], low, high) for v in values)
-        predicted = sum(each(Samples.squared_residual, grey, each(fit.at_corners, (second, first)))) / 2
+        predicted = sum(each(fit.squared_residual, grey, (second, first))) / 2
         if tried:
             # Cells beside a fit that stayed, which holds them back, have no say.
-            better = np.where(fit.at_corners(smoother).all(axis=1), tried[-1].predicted - predicted, 0.0)
+            better = np.where(fit.at_corners(smoother).all(axis=1), told[-1] - predicted, 0.0)
             smoother = smoother & (fit.nearby(area * better) > 0.0)
             if smoother.sum() <= _FEW * len(smoother):
                 break
             level[smoother] = len(tried)
         else:
             bend = fit.bending(*values)
-        tried.append(_Halves(first, second, predicted))
+        # Only the first and the last are asked for again: large meshes need the room.
+        told = [*told[:1], predicted]
+        tried.append(_Halves(first, second))
         best = [np.where(smoother[:, None], fresh, kept) for fresh, kept in zip(values, best, strict=True)]
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
-    distance = sharpest.predicted - sharpest.spread(fit) / 2.0
+    distance = told[0] - sharpest.spread(fit) / 2.0
     unseen = _unresolved(bend, distance, own_noise, area * shown)
     # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
     unseen[fit.broken] = np.maximum((distance - own_noise)[fit.broken], unseen[fit.broken])
@@ -128,9 +147,8 @@ def fit_halves(
         sampling += share * smoothed.spread(fit) / 4.0
         unseen += share * smoothed.smoothed_by(sharpest, fit)
     chosen = np.array(ALPHAS)[level]
-    start = _in_colour((best[0] + best[1])[:, 0] / 2.0, fit.averages(together), to_grey)
-    light = fit.solve_within(together, chosen, limits, start, loose, each)
-    return Fitted(chosen, light, light @ to_grey, sampling, unseen)
+    mean = (best[0] + best[1]) / 2.0
+    return Fitted(chosen, mean, mean[:, 0], sampling, unseen)
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
@@ -143,11 +161,10 @@ def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
 
 @dataclass(frozen=True, eq=False)
 class _Halves:
-    """The fits of both halves at the vertices (v,), and how well each predicts the other's samples (c,)."""
+    """The fits of both halves at the vertices (v,)."""
 
     first: Float64
     second: Float64
-    predicted: Float64
 
     def spread(self, fit: Fit) -> Float64:
         """(c,) squared difference of the halves."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -37,8 +37,7 @@ class Receivers:
     """The output meshes of the receivers, and the cells on all of them: the triangles of the fine meshes, which are the
     output meshes unless the input's own triangles are kept.
 
-    first (r + 1,): where each receiver's output triangles begin. element_corners (e, 3, 3) of the output triangles in
-    the unit box, element_shading (e, 3, 3) their corners' normals, element_surface (e,) into Scene.surfaces.
+    first (r + 1,): where each receiver's output triangles begin. element_surface (e,): theirs, into Scene.surfaces.
     places (e, 3, k): what else, if given, breaks the fit where it changes over an edge. breaks (e, 3): sides, from each
     corner to the next, over which light jumps, so that the fit breaks there; None if there is none.
     """
@@ -49,8 +48,6 @@ class Receivers:
     fine: tuple[Tessellation, ...]
     cells: Cells
     first: Int32
-    element_corners: Float64
-    element_shading: Float64
     element_surface: Int32
     places: Float64 | None = None
     breaks: Bool | None = None
@@ -59,6 +56,26 @@ class Receivers:
     def corner_vertex(self) -> Int32:
         """(e, 3) the fit vertex of each corner of the output triangles."""
         return self._fit_vertices[0]
+
+    @property
+    def elements(self) -> int:
+        """How many output triangles there are."""
+        return int(self.first[-1])
+
+    @property
+    def element_corners(self) -> Float64:
+        """(e, 3, 3) corners of the output triangles in the unit box."""
+        # Not kept beside those of the cells: large meshes need the room.
+        whole = len(self.cells) == self.elements
+        return self.cells.corners if whole else _corners(self.meshes, self.space)
+
+    @property
+    def element_shading(self) -> Float64:
+        """(e, 3, 3) normals at the corners of the output triangles."""
+        cells = self.cells
+        if len(cells) > self.elements:
+            return _shading(self.objects, self.meshes, triangle_geometry(self.element_corners)[0])
+        return _all_corners(cells.normals) if cells.shading is None else cells.shading
 
     @property
     def tessellated(self) -> bool:
@@ -138,44 +155,50 @@ def lay_out(
     """
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]
     first = np.concatenate([[0], np.cumsum([len(m.triangles) for m in meshes])]).astype(np.int32)
-    corners, normals, area, shading, surface = _faces(objects, fine, space)
+    corners = _corners(fine, space)
+    normals, area = triangle_geometry(corners)
+    flat = all(o.corner_normals is None for o in objects)
+    shading = None if flat else _shading(objects, fine, normals)
     element, barycentric = np.arange(len(area), dtype=np.int32), None
-    element_corners, element_shading, element_surface = corners, shading, surface
     if not tessellate:
         element = np.concatenate([begin + m.parent for begin, m in zip(first, fine, strict=False)]).astype(np.int32)
         barycentric = np.concatenate([m.barycentric for m in fine])
-        if len(element) > first[-1]:
-            element_corners, _, _, element_shading, element_surface = _faces(objects, meshes, space)
-    flat = all(o.corner_normals is None for o in objects)
+        # From here on one copy serves both: large meshes need the room.
+        ends = np.cumsum([len(m.triangles) for m in fine])[:-1]
+        fine = [replace(m, barycentric=b) for m, b in zip(fine, np.split(barycentric, ends), strict=True)]
     return Receivers(
         space=space,
         objects=objects,
         meshes=tuple(meshes),
         fine=tuple(fine),
-        cells=Cells(corners, normals, area, None if flat else shading, element, barycentric, surface, front),
+        cells=Cells(corners, normals, area, shading, element, barycentric, _surfaces(objects, fine), front),
         first=first,
-        element_corners=element_corners,
-        element_shading=element_shading,
-        element_surface=element_surface,
+        element_surface=_surfaces(objects, meshes),
     )
 
 
-def _faces(
-    objects: tuple[SceneObject, ...], meshes: list[Tessellation], space: Space
-) -> tuple[Float64, Float64, Float64, Float64, Int32]:
-    """Of the triangles of all meshes: corners (t, 3, 3) in the unit box, normals (t, 3), areas (t,), shading normals
-    (t, 3, 3) and surfaces (t,)."""
-    corners = np.concatenate([space.normalise(m.vertices)[m.triangles] for m in meshes])
-    normals, area = triangle_geometry(corners)
-    surface = np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)])
+def _corners(meshes: Sequence[Tessellation], space: Space) -> Float64:
+    """(t, 3, 3) of the triangles of all meshes, in the unit box."""
+    return np.concatenate([space.normalise(m.vertices)[m.triangles] for m in meshes])
+
+
+def _surfaces(objects: tuple[SceneObject, ...], meshes: Sequence[Tessellation]) -> Int32:
+    """(t,) of the triangles of all meshes, into Scene.surfaces."""
+    return np.concatenate([o.surface[m.parent] for o, m in zip(objects, meshes, strict=True)]).astype(np.int32)
+
+
+def _shading(objects: tuple[SceneObject, ...], meshes: Sequence[Tessellation], normals: Float64) -> Float64:
+    """(t, 3, 3) at the corners of the triangles of all meshes, whose own normals (t, 3) are known."""
     if all(o.corner_normals is None for o in objects):
-        return corners, normals, area, np.broadcast_to(normals[:, None], corners.shape), surface.astype(np.int32)
+        return _all_corners(normals)
     ends = np.cumsum([len(m.triangles) for m in meshes])[:-1]
-    shading = [
-        shading_normals(o, m.parent, m.barycentric, n)
-        for o, m, n in zip(objects, meshes, np.split(normals, ends), strict=True)
-    ]
-    return corners, normals, area, np.concatenate(shading), surface.astype(np.int32)
+    parts = zip(objects, meshes, np.split(normals, ends), strict=True)
+    return np.concatenate([shading_normals(o, m.parent, m.barycentric, n) for o, m, n in parts])
+
+
+def _all_corners(normals: Float64) -> Float64:
+    """The normals (t, 3) of flat triangles, at each of their corners (t, 3, 3)."""
+    return np.broadcast_to(normals[:, None], (len(normals), 3, 3))
 
 
 def _numbered(meshes: tuple[Tessellation, ...]) -> Int32:

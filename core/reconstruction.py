@@ -36,6 +36,8 @@ _WEIGHTLESS = 1e-12
 _MEASURED = 0.02
 #: How many steps from vertex to vertex lead over the surroundings that tell how smooth a fit should be.
 _RINGS = 8
+#: Cells that are looked at together: what is done with them stays in the processor's caches.
+_CHUNK = 1 << 14
 #: The pairs of corners of the six entries of a symmetric 3 x 3 matrix.
 _ROW, _COLUMN = np.array([0, 1, 2, 0, 0, 1]), np.array([0, 1, 2, 1, 2, 2])
 #: Which of these six belongs to each side of a triangle.
@@ -54,18 +56,20 @@ class Samples:
     products of barycentric weights (00, 11, 22, 01, 02, 12); light (c, 3, k): weight times value; squares (c,): squared
     mean light; noise (c,): its own variances; low, high (c, k): the least and the largest value; count (c,): valid
     samples; tried (c,): with the invalid ones.
+    other: the other half of the same samples, with which it shares low and high: nobody asks for those of a half, and
+    large meshes need the room.
     """
 
-    def __init__(self, cells: int, to_grey: Float64) -> None:
+    def __init__(self, cells: int, to_grey: Float64, other: Samples | None = None) -> None:
         self.to_grey = to_grey
         self.moments = np.zeros((cells, 6))
         self.light = np.zeros((cells, 3, len(to_grey)))
         self.squares = np.zeros(cells)
         self.noise = np.zeros(cells)
-        self.low = np.full((cells, len(to_grey)), np.inf)
-        self.high = np.full((cells, len(to_grey)), -np.inf)
-        self.count = np.zeros(cells)
-        self.tried = np.zeros(cells)
+        self.low: Float64 = np.full((cells, len(to_grey)), np.inf) if other is None else other.low
+        self.high: Float64 = np.full((cells, len(to_grey)), -np.inf) if other is None else other.high
+        self.count = np.zeros(cells, dtype=np.int32)
+        self.tried = np.zeros(cells, dtype=np.int32)
 
     def add(self, index: np.ndarray | slice, weights: Float64, values: Float64, noise: Float64, valid: Bool) -> None:
         """One sample for each cell of index: weights (n, 3) barycentric in the output triangle; values (n, k); noise
@@ -110,17 +114,18 @@ class Samples:
         alone.light = (self.light @ self.to_grey)[:, :, None]
         return alone
 
-    def squared_residual(self, corners: Float64) -> Float64:
-        """Mean (c,) of (mean light - interpolated)^2 over each cell's samples, for corner values (c, 3)."""
-        m, light = self.moments.T, (self.light @ self.to_grey).T
+    def squared_residual(self, corners: Float64, part: slice = slice(None)) -> Float64:
+        """Mean (n,) of (mean light - interpolated)^2 over the samples of each cell in a part of them, for corner values
+        (n, 3)."""
+        m, light = self.moments[part].T, (self.light[part] @ self.to_grey).T
         x, y, z = corners.T
         total = x * (m[0] * x + 2.0 * (m[3] * y + m[4] * z - light[0]))
         total += y * (m[1] * y + 2.0 * (m[5] * z - light[1]))
         total += z * (m[2] * z - 2.0 * light[2])
-        return np.maximum(self.squares + total, 0.0) / np.maximum(self.count, 1.0)
+        return np.maximum(self.squares[part] + total, 0.0) / np.maximum(self.count[part], 1.0)
 
 
-def _sum(arrays: Iterable[Float64]) -> Float64:
+def _sum(arrays: Iterable[NDArray[Any]]) -> NDArray[Any]:
     """Of arrays of one shape."""
     return reduce(np.add, arrays)
 
@@ -155,7 +160,7 @@ class Fit:
         self._corner = receivers.corner_vertex[receivers.cells.element]
         self.measured = self._scatter(lumped) > _MEASURED
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
-        self._edge, self._edge_ends = numbered_edges(receivers.corner_vertex)
+        self._edge, self._edge_ends = (number.astype(np.int32) for number in numbered_edges(receivers.corner_vertex))
         self.broken = receivers.broken
         self._both_known = self.measured[self._edge_ends].all(axis=1)
         self.filled = ~self.measured & self._beside_measured()
@@ -274,7 +279,7 @@ class Fit:
         averaged = system.target / np.maximum(system.lumped, np.finfo(float).tiny)[:, None]
         return np.where(self.measured[:, None], averaged, 0.0)
 
-    def _cells_around(self) -> tuple[Int32, Int64, Int64]:
+    def _cells_around(self) -> tuple[Int32, Int32, Int64]:
         """Vertices (m,) with cells around them, those cells one vertex after the other, and where each begins there.
 
         Sorted once for all, extremes around vertices take a tenth of what minimum.at does.
@@ -282,7 +287,7 @@ class Fit:
         vertex = self._corner.ravel()
         order = stable_order(vertex)
         first = np.flatnonzero(np.diff(vertex[order], prepend=-1))
-        return vertex[order[first]], order // 3, first
+        return vertex[order[first]], (order // 3).astype(np.int32), first
 
     def limits(self, *samples: Samples) -> tuple[Float64, Float64]:
         """Least and largest light (v, k) that a vertex may have: that of all samples in the triangles around it.
@@ -357,9 +362,18 @@ class Fit:
         around = self._scatter(np.repeat(self._receivers.cells.area[:, None] / 3.0, 3, axis=1))
         return np.asarray((energy / np.maximum(around, np.finfo(float).tiny))[self._corner].mean(axis=1))
 
-    def at_corners(self, values: NDArray[Any]) -> NDArray[Any]:
-        """(c, 3, ...): what interpolation of vertex values (v, ...) starts from in each cell's output triangle."""
-        return values[self._corner]
+    def at_corners(self, values: NDArray[Any], part: slice = slice(None)) -> NDArray[Any]:
+        """(n, 3, ...): what interpolation of vertex values (v, ...) starts from in the output triangle of each cell, or
+        of each in a part of them."""
+        return values[self._corner[part]]
+
+    def squared_residual(self, samples: Samples, values: Float64) -> Float64:
+        """Mean (c,) of the samples' squared distance from vertex values (v,) of the mean light."""
+        found = np.empty(len(self._corner))
+        for begin in range(0, len(found), _CHUNK):
+            part = slice(begin, begin + _CHUNK)
+            found[part] = samples.squared_residual(self.at_corners(values, part), part)
+        return found
 
     def _scatter(self, corner_values: Float64) -> Float64:
         return np.bincount(self._corner.ravel(), corner_values.ravel(), self._count).astype(np.float64)

@@ -167,6 +167,11 @@ def dark(total: Float64, direct: Float64, mean: float) -> Bool:
     return np.asarray((total <= _DARK * mean) & (direct <= 0))
 
 
+def _halves(cells: int, to_grey: Float64) -> list[Samples]:
+    first = Samples(cells, to_grey)
+    return [first, Samples(cells, to_grey, first)]
+
+
 class Survey:
     """The samples so far: two independent halves of each of indirect and direct light.
 
@@ -189,9 +194,9 @@ class Survey:
         self.receivers = receivers
         self.surroundings = surroundings
         to_grey = surroundings.to_grey if surroundings else np.zeros(0)
-        self.indirect = [Samples(count, to_grey), Samples(count, to_grey)]
+        self.indirect = _halves(count, to_grey)
         channels = np.full(effort.channels * (2 if sky_light else 1), 1 / effort.channels)
-        self.direct = [Samples(count, channels), Samples(count, channels)]
+        self.direct = _halves(count, channels)
         self.coarser = [np.zeros(count), np.zeros(count)]
         self.invalid = np.zeros(count, dtype=bool)
         self.passes = 0
@@ -214,9 +219,10 @@ class Survey:
         """Before the first pass: take the samples of the cells that an earlier survey had as well; as many passes as it
         had will look at the others only."""
         here, there = same_cells(self.receivers.cells, earlier.receivers.cells)
-        for halves, known in ((self.indirect, earlier.indirect), (self.direct, earlier.direct)):
-            for samples, others in zip(halves, known, strict=True):
-                samples.recall(others, here, there)
+        # A half that no pass has come to yet holds nothing, and takes no memory until then.
+        for half in range(min(earlier.passes, 2)):
+            self.indirect[half].recall(earlier.indirect[half], here, there)
+            self.direct[half].recall(earlier.direct[half], here, there)
         for coarser, other in zip(self.coarser, earlier.coarser, strict=True):
             coarser[here] = other[there]
         self.invalid[here] = earlier.invalid[there]
@@ -256,7 +262,7 @@ class Survey:
     @property
     def valid_samples(self) -> Float64:
         """(c,) samples of each cell that are in sight."""
-        return self.direct[0].count + self.direct[1].count
+        return np.asarray(self.direct[0].count + self.direct[1].count, dtype=np.float64)
 
     @property
     def share_in_sight(self) -> Float64:
@@ -352,7 +358,7 @@ class Survey:
         """
         element, around = self.receivers.cells.element, self._glance
         hidden = self.invalid & (self.valid_samples == 0)
-        buried = np.ones(len(self.receivers.element_corners), dtype=bool)
+        buried = np.ones(self.receivers.elements, dtype=bool)
         buried[element[~hidden]] = False
         for k, weights in enumerate(_BESIDES):
             chosen = np.flatnonzero(buried[element])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene import Bool, Float64
+from .scene import Bool, Float64, Int32
 from .sorting import stable_order
 from .tessellation import Int64
 
@@ -26,12 +26,12 @@ class SymmetricPattern:
         row, column = pairs.T.ravel(), pairs[:, ::-1].T.ravel()
         order = stable_order(row)
         # One more, for the places that are not filled.
-        column, pair = np.append(column[order], 0), np.append(order % max(len(pairs), 1), len(pairs))
+        column, pair = np.append(column[order], 0), np.append(order % max(len(pairs), 1), len(pairs)).astype(np.int32)
         length = np.bincount(row, minlength=count)
         first = np.cumsum(length) - length
         longest = stable_order(length.max(initial=0) - length)
         self.rank = stable_order(longest)
-        self.blocks: list[tuple[Int64, Int64]] = []
+        self.blocks: list[tuple[Int64, Int32]] = []
         while len(longest):
             places = np.arange(length[longest[0]])[:, None]
             rows, longest = np.split(longest, [max(_BLOCK // max(len(places), 1), 1)])
