@@ -324,7 +324,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     textured = any(varies(scene, o) for o in scene.receivers())
     return Effort(
         error=asked,
-        triangles=settings.triangles,
+        triangles=settings.triangles if settings.tessellate else _sampled(settings.triangles, asked),
         coarsest=_COARSEST if settings.tessellate and settings.size is None and not textured else 1.0,
         growth=2.0,
         estimator=estimator,
@@ -340,6 +340,12 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         emitters_by_rays=emitters_by_rays(scene),
         channels=3 if settings.effects.get("colour") or colour(scene, settings).active else 1,
     )
+
+
+def _sampled(triangles: int, error: float) -> int:
+    """On how many cells light is sampled where triangles are kept, if these are not as many already: they show no
+    more."""
+    return max(int(triangles * min(0.02 / error, 1.0)), min(triangles, _FEWEST))
 
 
 def gather_rays(error: float, cells: int = 0) -> int:
