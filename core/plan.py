@@ -40,7 +40,7 @@ _COARSEST = 16.0
 #: Triangles and patches below which a bake shows next to nothing.
 _FEWEST = 1500
 #: Lights that each half of the rays asks at a point, at least, where there are too many.
-_FEWEST_LIGHTS = 7
+_FEWEST_LIGHTS = 4
 #: Choosing among many emitting triangles costs as much as this many lamps.
 _TREE_COST = 8
 #: Relative errors that sampling leaves after two passes, and the triangles, with as many rays and on as many cells as
@@ -331,7 +331,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         transport_rays=64,
         shadow_rays=4,
-        lights=int(MOST_ASKED * min(0.02 / asked, 1.0) ** 0.5),
+        lights=max(int(MOST_ASKED * min(0.02 / asked, 1.0)), _FEWEST_LIGHTS),
         gather_rays=gather_rays(asked, sum(len(o.triangles) for o in scene.receivers())),
         passes=2,
         boundary_passes=8,
