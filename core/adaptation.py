@@ -129,26 +129,28 @@ class Adaptation:
     def _probe(self, cells: Cells, chosen: Int64, level: int, mean: float, near: Bool) -> _Probe:
         """What points of each chosen cell see; near (n,): where they may be inside a solid."""
         shift = stream(self._seed, f"adaptation {level}").random((len(cells), 2))
-        seen = []
-        for k in range(_POINTS):
-            points = Points.of_pass(cells, chosen, k, shift)
-            streams = _FIRST_STREAM + 100 * level + k
-            light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
-            self.rays += light.rays
-            direct = light.grey
-            hidden = np.zeros(len(chosen), dtype=bool)
-            if self._around is not None:
-                # Where the sources shine nothing is hidden.
-                unlit = np.flatnonzero(near & (direct <= 0))
-                unlit = unlit[self._beneath(self._around, points.only(unlit))]
-                if len(unlit):
-                    there = Points.of_pass(cells, chosen[unlit], k, shift)
-                    total, enclosed = self._look(self._around, streams, there)
-                    seen_light = partial(self._seen, self._around, 100_000_000 + streams)
-                    hidden[unlit] = out_of_sight(there, self._around, enclosed, total, direct[unlit], mean, seen_light)
-            variance = np.sqrt(light.variance).mean(axis=1) ** 2
-            seen.append((light.signature, direct, variance, hidden))
-        return _Probe(*(np.stack(s) for s in zip(*seen, strict=True)))
+        cell, place, near = np.tile(chosen, _POINTS), np.repeat(np.arange(_POINTS), len(chosen)), np.tile(near, _POINTS)
+        points = Points.of_pass(cells, cell, place, shift)
+        streams = _FIRST_STREAM + level
+        light = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, streams, self._workers)
+        self.rays += light.rays
+        direct = light.grey
+        hidden = np.zeros(len(cell), dtype=bool)
+        if self._around is not None:
+            # Where the sources shine nothing is hidden.
+            unlit = np.flatnonzero(near & (direct <= 0))
+            unlit = unlit[self._beneath(self._around, points.only(unlit))]
+            if len(unlit):
+                there = Points.of_pass(cells, cell[unlit], place[unlit], shift)
+                total, enclosed = self._look(self._around, streams, there)
+                seen_light = partial(self._seen, self._around, 100_000_000 + streams)
+                hidden[unlit] = out_of_sight(there, self._around, enclosed, total, direct[unlit], mean, seen_light)
+        variance = np.sqrt(light.variance).mean(axis=1) ** 2
+        of_cells = _POINTS, len(chosen)
+        return _Probe(
+            light.signature.reshape(of_cells), direct.reshape(of_cells), variance.reshape(of_cells),
+            hidden.reshape(of_cells),
+        )  # fmt: skip
 
     def _beneath(self, around: Surroundings, points: Points) -> Bool:
         """Which of the points (n,) may be inside a solid or a gap: from the others nobody need look around."""

@@ -24,8 +24,8 @@ class Points:
     """A point in each of the cells in `chosen`, at its barycentric weights (n, 3)."""
 
     @classmethod
-    def of_pass(cls, cells: Cells, chosen: np.ndarray, number: int, shift: Float64) -> Points:
-        """The sample points of one pass: the pass-th point of an even sequence in each cell."""
+    def of_pass(cls, cells: Cells, chosen: np.ndarray, number: int | np.ndarray, shift: Float64) -> Points:
+        """The sample points of one pass, or of one (n,) each: the pass-th point of an even sequence in each cell."""
         weights = triangle_points(plane_points(np.full(len(chosen), number), shift[chosen]))
         # All cells, as they are, need no copies.
         every = len(chosen) == len(cells) and np.array_equal(chosen, np.arange(len(cells)))

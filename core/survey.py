@@ -29,8 +29,9 @@ from .sky import Sky
 from .transport import Transport
 from .visibility import Visibility
 
-#: Samples that are added at a time.
-_CHUNK = 8192
+#: Samples that are added at a time, and points beside shadow boundaries that are looked at together: many calls for few
+#: points each take longer than the light does.
+_CHUNK, _BESIDE = 8192, 65536
 #: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
 #: cell's size, one that gets less than half.
 _DARK, _DIM, GAP = 0.05, 0.5, 0.25
@@ -341,13 +342,19 @@ class Survey:
         chosen = np.flatnonzero(self._uncertain() & ~self.invalid)
         if not len(chosen):
             return
+        together = max(_BESIDE // len(chosen), 1)
+        for first in range(0, passes, together):
+            self._refine(chosen, min(together, passes - first))
+
+    def _refine(self, chosen: NDArray[np.int64], passes: int) -> None:
+        """More points, so many in each of the chosen cells, for direct light only."""
+        # Numbers far from those of the full passes: the streams must differ, the points go on evenly.
+        numbers = np.repeat(self.passes + self._extra + np.arange(passes), len(chosen))
+        points = Points.of_pass(self.receivers.cells, np.tile(chosen, passes), numbers, self._shift)
+        light = self._direct(points, 1_000_000 + self._extra)
         everywhere = np.ones(len(chosen), dtype=bool)
-        for _ in range(passes):
-            # A number far from those of the full passes: the streams must differ, the points go on evenly.
-            number = self.passes + self._extra
-            points = Points.of_pass(self.receivers.cells, chosen, number, self._shift)
-            light = self._direct(points, 1_000_000 + self._extra)
-            self._add_direct(self._extra, chosen, points, light, everywhere)
+        for one in np.split(np.arange(len(numbers)), passes):
+            self._add_direct(self._extra, chosen, points.only(one), light.only(one), everywhere)
             self._extra += 1
 
     def buried(self) -> Bool:

@@ -43,6 +43,10 @@ class Illumination:
         """(n,) mean over red, green and blue."""
         return np.asarray(self.irradiance.sum(axis=1) / 3.0)
 
+    def only(self, chosen: NDArray[np.int64]) -> Illumination:
+        """At some of the points; of rays all are counted."""
+        return Illumination(self.irradiance[chosen], self.variance[chosen], self.signature[chosen], self.rays)
+
     def beside(self, other: Illumination) -> Illumination:
         """Both, told apart by their channels."""
         partly = (self.signature < 0) | (other.signature < 0)

@@ -19,7 +19,7 @@ from ...core.comparison import reference_noise
 from ...core.parallel import thread_count
 from ...core.plan import choose_effort
 from ...core.settings import Settings
-from .measure import Run, bake_once, bake_twice, cycles_runs, make_reference
+from .measure import Run, bake_often, bake_with_noise, cycles_runs, make_reference
 from .scenes import SCENES
 
 DOCS = Path(__file__).resolve().parents[1]
@@ -32,7 +32,8 @@ HONEST = (0.7, 1.5)
 @dataclass(frozen=True)
 class Scale:
     """triangles of the even meshes that Cycles bakes too, and of those that follow the light, at most; asked errors;
-    samples of Cycles; points of the reference and its paths; sizes of the growth; patches of the original scheme."""
+    samples of Cycles; points of the reference and its paths; sizes of the growth; patches of the original scheme; how
+    many times short bakes are measured."""
 
     even: int
     triangles: int
@@ -42,6 +43,7 @@ class Scale:
     paths: int
     sizes: tuple[int, ...]
     patches: tuple[int, ...]
+    times: int
 
 
 FULL = Scale(
@@ -53,6 +55,7 @@ FULL = Scale(
     paths=256,
     sizes=(1_000, 10_000, 100_000, 1_000_000),
     patches=(1_000, 3_000, 10_000),
+    times=3,
 )
 QUICK = Scale(
     even=400,
@@ -63,6 +66,7 @@ QUICK = Scale(
     paths=16,
     sizes=(500, 1_000),
     patches=(100, 300),
+    times=1,
 )
 #: Where growth is measured, and the original scheme: in a closed scene the light of its rows would grow for ever.
 _GROWING, _OPEN = "doorway", "cornell_box"
@@ -85,16 +89,16 @@ def against_cycles(name: str, scale: Scale, threads: int) -> Beside:
     kept, own = [], []
     for error in scale.errors:
         settings = Settings(tessellate=False, triangles=scale.even, error=error, threads=threads)
-        baked = bake_twice(name, f"{error:.0%} asked, even", settings, even)
+        baked = bake_with_noise(name, f"{error:.0%} asked, even", settings, even, scale.times)
         kept.append(baked.run)
         _say(name, baked.run)
-    rivals = cycles_runs(baked, scale.cycles, even, threads)
+    rivals = cycles_runs(baked, scale.cycles, even, threads, scale.times)
     for run in rivals:
         _say(f"{name}, Cycles", run)
     modelled = make_reference(name, scale.points, scale.paths, FOLDER)
     for error in scale.errors:
         settings = Settings(triangles=scale.triangles, error=error, threads=threads)
-        own.append(bake_once(name, f"{error:.0%} asked", settings, modelled).run)
+        own.append(bake_often(name, f"{error:.0%} asked", settings, modelled, scale.times).run)
         _say(name, own[-1])
     noise = [reference_noise(reference.radiance[reference.visible]) for reference in (even, modelled)]
     return Beside((noise[0], noise[1]), kept, own, rivals)
@@ -104,7 +108,7 @@ def growth(scale: Scale, threads: int) -> Iterator[Run]:
     """The same scene modelled with more and more triangles of its own, all of them kept, at 5 %."""
     for size in scale.sizes:
         settings = Settings(tessellate=False, triangles=size, error=0.05, threads=threads)
-        run = bake_once(_GROWING, f"{size:,} asked", settings, None).run
+        run = bake_often(_GROWING, f"{size:,} asked", settings, None, scale.times).run
         _say("growth", run)
         yield run
 
@@ -116,7 +120,7 @@ def original_scheme(scale: Scale, threads: int) -> Iterator[Run]:
         for estimator in ("centroid", "hemisphere"):
             asked = Settings(triangles=scale.triangles, error=None, estimator=estimator, threads=threads)
             effort = replace(choose_effort(reference.scene, asked), patches=patches)
-            run = bake_once(_OPEN, f"{estimator}, {patches:,} patches", asked, reference, effort).run
+            run = bake_often(_OPEN, f"{estimator}, {patches:,} patches", asked, reference, scale.times, effort).run
             _say("original scheme", run)
             yield run
 

@@ -27,6 +27,8 @@ from .scenes import build, subdivide
 
 #: Of the points and of Cycles' paths; the bakes have others.
 _SEED = 7
+#: Seconds from which on a bake is long.
+_SHORT = 5.0
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,18 @@ def make_reference(name: str, points: int, samples: int, cache: Path, triangles:
     return Reference(scene, at, radiance, visible(scene, at, radiance))
 
 
+def bake_often(
+    name: str, label: str, settings: Settings, reference: Reference | None, times: int, effort: Effort | None = None
+) -> Baked:
+    """As `bake_once`, but a short bake so many times: what it took is the median of that. A long one needs no more,
+    for what disturbs it now and then evens out."""
+    bakes = [bake_once(name, label, settings, reference, effort)]
+    while len(bakes) < times and bakes[0].run.seconds < _SHORT:
+        bakes.append(bake_once(name, label, settings, reference, effort))
+    middle = sorted((baked.run for baked in bakes), key=lambda run: run.seconds)[len(bakes) // 2]
+    return replace(bakes[-1], run=middle)
+
+
 def bake_once(
     name: str, label: str, settings: Settings, reference: Reference | None, effort: Effort | None = None
 ) -> Baked:
@@ -127,25 +141,28 @@ def bake_once(
     return Baked(run, values, result.objects, sources, copies)
 
 
-def bake_twice(name: str, label: str, settings: Settings, reference: Reference) -> Baked:
-    """As `bake_once`, with the noise: two bakes with different seeds differ by sqrt 2 of what each is off by."""
+def bake_with_noise(name: str, label: str, settings: Settings, reference: Reference, times: int) -> Baked:
+    """As `bake_often`, with the noise: two bakes with different seeds differ by sqrt 2 of what each is off by."""
     other = bake_once(name, label, replace(settings, seed=settings.seed + 1), reference).values
-    baked = bake_once(name, label, settings, reference)
+    baked = bake_often(name, label, settings, reference, times)
     truth, seen = reference.radiance, reference.visible
     noise = np.sqrt(np.mean((baked.values - other)[seen] ** 2) / 2.0) / truth[seen].mean()
     return replace(baked, run=replace(baked.run, noise=float(noise)))
 
 
-def cycles_runs(baked: Baked, samples: tuple[int, ...], reference: Reference, threads: int) -> list[Run]:
-    """Cycles' bakes to the corners of the mesh of `baked`, with rising numbers of samples.
+def cycles_runs(baked: Baked, samples: tuple[int, ...], reference: Reference, threads: int, times: int) -> list[Run]:
+    """Cycles' bakes to the corners of the mesh of `baked`, with rising numbers of samples; short ones so many times.
 
     The variance of its corners is v / samples, so two independent runs of m and n samples differ by v / m + v / n.
     """
     runs, values = [], []
     for count in samples:
-        begun, busy = perf_counter(), process_time()
-        corners = corner_bake(bpy.context, baked.copies, samples=count, seed=_SEED + count, threads=threads)
-        seconds, busy = perf_counter() - begun, process_time() - busy
+        took: list[tuple[float, float]] = []
+        while not took or (len(took) < times and took[0][0] < _SHORT):
+            begun, busy = perf_counter(), process_time()
+            corners = corner_bake(bpy.context, baked.copies, samples=count, seed=_SEED + count, threads=threads)
+            took.append((perf_counter() - begun, process_time() - busy))
+        seconds, busy = sorted(took)[len(took) // 2]
         objects = with_corners(baked.objects, baked.sources, corners)
         values.append(radiance_at(objects, reference.points)[reference.visible])
         triangles = sum(len(o.triangles) for o in objects)

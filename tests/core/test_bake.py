@@ -355,7 +355,7 @@ def test_smooth_shading_weighs_light_by_the_shading_normal(build):
     """A smooth ball under a distant lamp: E cos of the true sphere's normal, not of the flat triangle's."""
     ball = build.sphere(level=3, smooth=True)
     sun = SunLamp("sun", (0, 0, -1), (1.0, 1.0, 1.0))
-    result = preview(Scene((ball,), (WHITE,), (sun,)), tessellate=False, triangles=5000)
+    result = preview(Scene((ball,), (WHITE,), (sun,)), tessellate=False, triangles=5000, error=0.02)
     baked = result.objects[0]
     lit = corners(baked)[..., 2] > 0.3  # away from the terminator, where a linear element must cut a corner
     expected = 0.5 / np.pi * corners(baked)[..., 2]

@@ -11,7 +11,7 @@ from radiosity_baker.core.bake import bake
 from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, gather_rays, plan, plan_with_prices, thriftier
+from radiosity_baker.core.plan import LOOKING, choose_effort, gather_rays, plan, plan_with_prices, thriftier
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
@@ -187,12 +187,23 @@ def test_less_time_makes_less_of_everything_but_what_the_mesh_has(build, monkeyp
     assert one.gather_rays <= two.gather_rays
 
 
+def test_rough_bakes_sample_kept_meshes_on_fewer_cells(build):
+    """What is kept shows no more for being sampled more finely; what is new is as fine as was asked."""
+    room = Scene((build.sphere(level=2, inward=True),), (build.grey,), (LAMPS["point lamps"],))
+
+    def triangles(error: float, tessellate: bool) -> int:
+        return choose_effort(room, Settings(triangles=20_000, error=error, tessellate=tessellate)).triangles
+
+    assert [triangles(error, False) for error in (0.01, 0.02, 0.04, 0.2, 0.5)] == [20_000, 20_000, 10_000, 2_000, 1_500]
+    assert triangles(0.2, True) == 20_000
+
+
 def test_less_time_asks_fewer_of_many_lamps(build):
     """As many as are enough for a rough bake, and no more than there were."""
     effort = build.effort(lights=24)
     fewer = [thriftier(effort, steps).lights for steps in (1, 5, 24)]
-    assert effort.lights > fewer[0] > fewer[1] >= fewer[2] == 7
-    assert thriftier(replace(effort, lights=7), 24).lights == 7
+    assert effort.lights > fewer[0] > fewer[1] >= fewer[2] == 4
+    assert thriftier(replace(effort, lights=4), 24).lights == 4
     assert thriftier(replace(effort, lights=3), 24).lights == 3
 
 
