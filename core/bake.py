@@ -78,8 +78,10 @@ def bake(
             clock.progress.expected = planned.seconds
         with clock.stage("tessellate", 0.03):
             start = max(int(effort.triangles / effort.coarsest), 1)
-            receivers = make_receivers(scene, space, settings, start)
-            patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers, pilot)
+            receivers, (patches, visibility) = workers.beside(
+                partial(make_receivers, scene, space, settings, start),
+                partial(patches_by_light, around, space, lights, effort, settings.seed, workers, pilot),
+            )
             del pilot  # it holds a copy of the scene
             direct_light = DirectLight(lights, visibility, settings.seed, effort.lights)
         with clock.stage("transport", 0.1, until=0.28):

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -97,6 +98,22 @@ class Patches:
 
     def __len__(self) -> int:
         return len(self.patch_area)
+
+    @cached_property
+    def coarser_groups(self) -> Int32:
+        """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
+        become one: those whose centres lie in one cube of a grid, each side of it as large as four of them."""
+        weight = self.area / self.patch_area[self.patch]
+        centres = (self.corners[:, 0] + self.corners[:, 1] + self.corners[:, 2]) / 3.0
+        center, facing = (
+            np.stack([np.bincount(self.patch, weight * values[:, k], len(self)) for k in range(3)], axis=1)
+            for values in (centres, self.normals)
+        )
+        median = np.median(self.patch_area)
+        level = np.rint(np.log2(self.patch_area / median) / 2.0)[:, None]
+        edge = 2.0 * np.sqrt(median) * 2.0**level
+        key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), self.surface])
+        return distinct(row_numbers(key.astype(np.int64)))[2].astype(np.int32)
 
     @property
     def coloured(self) -> bool:
@@ -276,22 +293,6 @@ def row_numbers(key: Int64) -> Int64:
         number = number * span + (column - least)
         count *= span
     return number
-
-
-def coarser_groups(patches: Patches) -> Int32:
-    """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
-    become one: those whose centres lie in one cube of a grid, each side of it as large as four of them."""
-    weight = patches.area / patches.patch_area[patches.patch]
-    count = len(patches)
-    center, facing = (
-        np.stack([np.bincount(patches.patch, weight * values[:, k], count) for k in range(3)], axis=1)
-        for values in (patches.corners.mean(axis=1), patches.normals)
-    )
-    median = np.median(patches.patch_area)
-    level = np.rint(np.log2(patches.patch_area / median) / 2.0)[:, None]
-    edge = 2.0 * np.sqrt(median) * 2.0**level
-    key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), patches.surface])
-    return distinct(row_numbers(key.astype(np.int64)))[2].astype(np.int32)
 
 
 def shading_normals(receiver: SceneObject, parent: Int32, barycentric: Float64, normals: Float64) -> Float64:

@@ -14,7 +14,7 @@ from .form_factors.hemisphere import Opening, hemisphere_rows
 from .form_factors.rows import Rows, balance, one_sided, symmetric_exchange
 from .form_factors.sides import SITES, Sides
 from .parallel import Workers
-from .patches import Patches, coarser_groups
+from .patches import Patches
 from .plan import Effort, Plan
 from .sampling import stream
 from .scene import ALBEDO_LIMIT, Float32, Float64
@@ -86,7 +86,7 @@ class Transport:
 
     def over_coarser_patches(self, values: Float64) -> Float64:
         """Values (s, k) averaged over groups of about four neighbouring patches."""
-        groups = coarser_groups(self.sides.patches)
+        groups = self.sides.patches.coarser_groups
         group = groups[self.sides.patch] + self.sides.back * (int(groups.max()) + 1)
         area = np.bincount(group, self.sides.area)
         means = [np.bincount(group, self.sides.area * v) / np.maximum(area, 1e-300) for v in values.T]

@@ -14,7 +14,7 @@ from radiosity_baker.core.accuracy import (
     squared_mean,
 )
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import coarser_groups, unit_space
+from radiosity_baker.core.patches import unit_space
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.reconstruction import Fit, Samples
@@ -164,7 +164,7 @@ def test_coarser_groups_blur_as_squares_of_four_patches(build):
     """Second moments about the centre: A/9 each way of a right-angled triangle with equal legs, A/3 of a square of four
     of them: three times as much. A grid that cuts across the triangles makes it a little more."""
     made = build.patches(Scene((build.quad(),), (build.grey,)), 2048)
-    center, group = made.corners.mean(axis=1), coarser_groups(made)
+    center, group = made.corners.mean(axis=1), made.coarser_groups
     weight = np.bincount(group, made.patch_area)
     middle = np.stack([np.bincount(group, made.patch_area * x) / weight for x in center.T], axis=1)
     between = np.sum(made.patch_area[:, None] * (center - middle[group]) ** 2)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.patches import (
-    coarser_groups,
     shading_normals,
     split_objects,
     triangle_geometry,
@@ -126,7 +125,7 @@ def test_coarser_groups_are_several_times_fewer_and_mix_nothing(build):
     surfaces = tuple(Surface(str(k), (0.1 * (k + 1),) * 3) for k in range(6))
     room = build.box(inward=True, surface=range(6))
     made = build.patches(Scene((room,), surfaces), 3000)
-    group = coarser_groups(made)
+    group = made.coarser_groups
     look = {(g, round(float(a), 4)) for g, a in zip(group, made.albedo[:, 0], strict=True)}
     assert len(look) == group.max() + 1
     assert 3 <= len(made) / len(look) <= 8

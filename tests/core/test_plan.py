@@ -194,7 +194,13 @@ def test_rough_bakes_sample_kept_meshes_on_fewer_cells(build):
     def triangles(error: float, tessellate: bool) -> int:
         return choose_effort(room, Settings(triangles=20_000, error=error, tessellate=tessellate)).triangles
 
-    assert [triangles(error, False) for error in (0.01, 0.02, 0.04, 0.16, 0.5)] == [20_000, 20_000, 10_000, 2_500, 1_500]
+    assert [triangles(error, False) for error in (0.01, 0.02, 0.04, 0.16, 0.5)] == [
+        20_000,
+        20_000,
+        10_000,
+        2_500,
+        1_500,
+    ]
     assert triangles(0.2, True) == 20_000
 
 
