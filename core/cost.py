@@ -32,7 +32,7 @@ _BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 15.0, 400.0, 90
 #: Of any bake, however small, and of any round of finding where light bends.
 _FIXED, _ROUND = 1.5e7, 1.2e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
-_CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 2000.0, 13_000.0, 600.0
+_CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 1700.0, 15_000.0, 600.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ class Work:
 
     @property
     def memory_mb(self) -> float:
+        """By how much the process grows, in MB: whatever it holds already is not free anyway."""
         return (self.cells * _CELL_BYTES + self.patches * _PATCH_BYTES + self.own * _OWN_BYTES) / 1e6
 
 

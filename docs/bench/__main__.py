@@ -213,13 +213,14 @@ def _growth(runs: Sequence[Run], threads: int) -> tuple[list[str], list[list[str
         "of Embree alone",
         "stated error",
         "peak MB",
-        "predicted MB",
+        "of it the bake's",
+        "predicted",
         "Mrays",
     ]
     return head, [
         [f"{run.triangles:,}", f"{run.seconds:.2f}", f"{run.predicted:.2f}",
          f"{run.seconds * threads / run.embree:.1f} x", f"{run.stated:.2%}", f"{run.peak_mb:,.0f}",
-         f"{run.predicted_mb:,.0f}", f"{run.rays['total'] / 1e6:.1f}"]
+         f"{run.added_mb:,.0f}", f"{run.predicted_mb:,.0f}", f"{run.rays['total'] / 1e6:.1f}"]
         for run in runs
     ]  # fmt: skip
 
@@ -272,7 +273,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     scale, parts = QUICK if asked.quick else FULL, asked.parts.split(",")
     results: dict[str, Any] = {"threads": thread_count(asked.threads)}
-    # The largest first: the most memory a process has held is all that a system tells.
     results["growth"] = list(growth(scale, asked.threads)) if "growth" in parts else []
     names = asked.scenes or list(SCENES) if "scenes" in parts else []
     results["scenes"] = {name: against_cycles(name, scale, asked.threads) for name in names}

@@ -19,6 +19,7 @@ from ...addon.oracle import corner_bake, true_radiance
 from ...addon.scene_reader import ReceiverSource, read_scene
 from ...core.comparison import figures, radiance_at, scatter, visible
 from ...core.plan import Effort, plan
+from ...core.report import peak_memory_mb
 from ...core.result import BakedObject
 from ...core.scene import Float64
 from ...core.settings import Settings
@@ -29,6 +30,8 @@ from .scenes import build, subdivide
 _SEED = 7
 #: Seconds from which on a bake is long.
 _SHORT = 5.0
+#: Where Linux takes the wish to forget how much memory this process has held at most (5).
+_FORGET = Path("/proc/self/clear_refs")
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,8 @@ class Run:
 
     processor: seconds of all threads together. embree: seconds of all threads together inside Embree alone. noise: root
     mean square distance from its own converged result. stated: the error by the bake's own estimate. predicted, and
-    predicted_mb: what the plan said before.
+    predicted_mb: what the plan said before. peak_mb: what the process held at most, added_mb: by how much the bake made
+    it grow.
     """
 
     name: str
@@ -54,6 +58,7 @@ class Run:
     predicted: float = float("nan")
     predicted_mb: float = float("nan")
     peak_mb: float = float("nan")
+    added_mb: float = float("nan")
     patches: int = 0
     iterations: int = 0
     rays: dict[str, int] = field(default_factory=dict)
@@ -110,6 +115,7 @@ def bake_once(
         subdivide(objects, settings.triangles, nearly=reference is None)
     scene, sources = read_scene(bpy.context.evaluated_depsgraph_get(), objects, tessellate=settings.tessellate)
     planned = plan(scene, settings, effort)
+    held = _forget_peak_memory()
     with _embree() as inside:
         begun, busy = perf_counter(), process_time()
         result, copies = bake_objects(
@@ -133,6 +139,7 @@ def bake_once(
         predicted=planned.seconds,
         predicted_mb=planned.memory_mb,
         peak_mb=report.peak_memory_mb,
+        added_mb=report.peak_memory_mb - held,
         patches=report.patches,
         iterations=report.iterations,
         rays=report.rays,
@@ -178,6 +185,15 @@ def _errors(objects: Any, reference: Reference | None) -> dict[str, float]:
     values, seen = radiance_at(objects, reference.points), reference.visible
     found = figures(values[seen], reference.radiance[seen])
     return {"surface": found.surface, "typical": found.typical, "bias": found.bias}
+
+
+def _forget_peak_memory() -> float:
+    """What the process holds now, MB, from which on its peak counts; nan where the system forgets no peaks, as only
+    Linux does."""
+    if not _FORGET.exists():
+        return float("nan")
+    _FORGET.write_text("5", encoding="ascii")
+    return peak_memory_mb()
 
 
 @contextmanager
