@@ -36,7 +36,7 @@ from .scene import (
 )
 from .settings import Settings, asked_error
 from .sky import equal_texels
-from .textures import triangle_colours, triangle_emission, varying_albedo, varying_emission
+from .textures import shines, triangle_colours, triangle_emission, varying_albedo, varying_emission
 
 #: Emitting triangles up to this many are sampled one by one, as lamps are. Of more, some are chosen at each point, or,
 #: where they are more than this part of all surfaces, the rays that look around find them.
@@ -289,7 +289,8 @@ def textured_emission(scene: Scene, _: Settings) -> Effect:
 
 def emitting_triangles(scene: Scene) -> int:
     """How many triangles emit light."""
-    return sum(int(np.count_nonzero(triangle_emission(scene, o).max(axis=1) > 0)) for o in scene.objects)
+    shining = [o for o in scene.objects if shines(scene, o)]
+    return sum(int(np.count_nonzero(triangle_emission(scene, o).max(axis=1) > 0)) for o in shining)
 
 
 def emitters_by_rays(scene: Scene) -> bool:

@@ -172,6 +172,11 @@ def varying_emission(scene: Scene, scene_object: SceneObject) -> bool:
     return _some(scene, scene_object, lambda s: s.emission_texture is not None and max(s.emission) > 0)
 
 
+def shines(scene: Scene, scene_object: SceneObject) -> bool:
+    """Whether anything of an object may emit light."""
+    return _some(scene, scene_object, lambda s: max(s.emitted) > 0)
+
+
 def triangle_colours(scene: Scene, scene_object: SceneObject) -> Colours:
     """Mean colours of each triangle of an object."""
     every = np.arange(len(scene_object.triangles), dtype=np.int32)
@@ -186,8 +191,9 @@ def triangle_emission(scene: Scene, scene_object: SceneObject) -> Float64:
 
 
 def _some(scene: Scene, scene_object: SceneObject, holds: Callable[[Surface], bool]) -> bool:
-    """Whether some surface of an object is such."""
-    return any(holds(scene.surfaces[number]) for number in np.unique(scene_object.surface))
+    """Whether some surface of an object is such. Where none of the scene is, nobody looks at the triangles."""
+    such = np.array([holds(surface) for surface in scene.surfaces])
+    return bool(such.any() and such[scene_object.surface].any())
 
 
 def _placement(scene_object: SceneObject) -> Float32:

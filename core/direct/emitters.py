@@ -14,7 +14,7 @@ from ..effects import MOST_PANELS, emitters_by_rays, emitting_triangles
 from ..patches import Space, triangle_geometry
 from ..scene import Float64, Scene, SceneObject
 from ..tessellation import quarters
-from ..textures import MOST_POINTS, even_points, point_colours, triangle_emission
+from ..textures import MOST_POINTS, even_points, point_colours, shines, triangle_emission
 from .emitter_tree import EmitterTree
 from .illumination import Source
 from .lamps import Panel
@@ -71,7 +71,7 @@ def emitting_pieces(scene: Scene) -> list[Piece]:
     if emitting_triangles(scene) > MOST_PANELS:
         return []
     pieces = []
-    for scene_object in scene.objects:
+    for scene_object in (o for o in scene.objects if shines(scene, o)):
         emits = triangle_emission(scene, scene_object).max(axis=1) > 0
         pieces += [_piece(scene, scene_object, int(triangle), np.eye(3)) for triangle in np.flatnonzero(emits)]
     pieces = [piece for piece in pieces if piece.area > 0]
