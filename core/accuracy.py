@@ -203,9 +203,14 @@ def squared_mean(corners: Float64) -> Float64:
 
 def level_error(doubts: tuple[tuple[float, float], ...]) -> float:
     """Relative error of all reflected light together, from what the halves say of it: by their rays, and with coarser
-    patches."""
+    patches.
+
+    What both halves see alike stays in their mean, but of what rays do by chance only half, squared: and should they
+    cancel by chance, at least that.
+    """
     by_rays, by_coarser = np.array(doubts).T
-    return float(np.sqrt(np.mean(by_rays**2 + (by_coarser / COARSENING) ** 2)))
+    squared = max(float(by_rays.mean() ** 2), float(np.mean(by_rays**2)) / len(by_rays))
+    return float(np.sqrt(squared + np.mean((by_coarser / COARSENING) ** 2)))
 
 
 def estimate_error(

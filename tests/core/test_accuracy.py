@@ -7,10 +7,12 @@ import pytest
 
 from radiosity_baker.core.accuracy import (
     ALPHAS,
+    COARSENING,
     PARABOLA_BEND,
     STEP_BEND,
     _unresolved,
     fit_halves,
+    level_error,
     squared_mean,
 )
 from radiosity_baker.core.parallel import Workers
@@ -187,3 +189,16 @@ def test_a_loose_fit_is_off_by_no_more_than_it_may_and_threads_change_nothing(bu
     left = system.target - matrix @ loose.values
     ratio = np.sqrt(np.sum(left**2 / matrix.diagonal[:, None]) / np.sum(system.target**2 / matrix.diagonal[:, None]))
     assert 5e-4 < ratio < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("doubts", "said"),
+    [
+        ([(0.02, 0.0), (0.02, 0.0)], 0.02),  # both halves see the same: it is there
+        ([(0.02, 0.0), (0.0, 0.0)], 0.02 / 2**0.5),  # chance of one, which halves squared in their mean
+        ([(0.02, 0.0), (-0.02, 0.0)], 0.02 / 2**0.5),  # chance of both, which happens to cancel
+        ([(0.0, 0.02 * COARSENING), (0.0, -0.02 * COARSENING)], 0.02),  # patches are as large in both
+    ],
+)
+def test_the_level_is_as_sure_as_the_mean_of_two_halves(doubts, said):
+    assert level_error(tuple(doubts)) == pytest.approx(said)
