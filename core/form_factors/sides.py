@@ -102,8 +102,8 @@ def open_parts(
     """Those of the sides (s,) that lie under a solid in part, with points on their open parts alone; and the rays it
     took.
 
-    behind (s, SITES): share of each point's rays that meet backs. met_by: which of the sides (s,) some (s,) of
-    them see.
+    behind (s, SITES): share of each point's rays that meet backs. met_by: which of the sides (s,) some (s,) of them
+    see.
     """
     patches = sides.patches
     doubtful = behind > _OUTSIDE
@@ -128,6 +128,8 @@ def open_parts(
         rays["contact"] += code.size
     inside &= candidate[:, None]
     side = sides.side[np.where(enclosed, inside.all(axis=1), inside.any(axis=1))]
+    if not len(side):
+        return Sides(patches, side, sides.points[:0], sides.normals[:0], sides.open_share[:0]), rays
     points, normals = site_points(patches, side, stream(seed, "probes " + purpose).random((len(side), 1, 3)), _PROBES)
     bare = ~hemispheres.buried(points.reshape(-1, 3), normals.reshape(-1, 3), within).reshape(-1, _PROBES)
     rays["contact"] += hemispheres.BURIED_RAYS * bare.size
