@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -22,9 +23,10 @@ from .effects import (
     sky_lights,
 )
 from .openings import find_openings
+from .patches import triangle_geometry
 from .pilot import Pilot, look_for_sky
 from .result import Effect
-from .scene import Scene
+from .scene import Float64, Scene
 from .settings import Settings, asked_error
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
@@ -46,7 +48,9 @@ _TREE_COST = 8
 #: Relative errors that sampling leaves after two passes, and the triangles, with as many rays and on as many cells as
 #: named: typical of the scenes of `make bench`. Sampling falls with the cube root of the cells, since neighbours share
 #: what they learn; resolution with the square root.
-_TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.012, 0.01, 32, 20_000
+_TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.008, 0.01, 32, 20_000
+#: Share of the asked error that triangles leave which are added where light calls for them: typical too.
+_LEFT_TO_TRIANGLES = 0.7
 #: How many times as many cells as is typical count as dense: then a few rays less of each lose nothing.
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
@@ -66,8 +70,8 @@ _MOST_CROSSED = 0.25
 _TYPICAL_DIRECT = 0.5
 #: Finding that takes so many rounds at most, passes over all cells in each, and rays of each point that look around.
 BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
-#: Each round has a fit, of fewer cells than there are in the end; contours take so many points for each cell.
-_BEND_FITS, _CONTOUR_POINTS = 2, 12
+#: Contours take so many points for each cell.
+_CONTOUR_POINTS = 12
 #: Share of the cells in which the shadow of one lamp ends; error from which on these need many points.
 _CROSSED, _UNCERTAIN = 0.05, 0.05
 #: Each step of thrift leaves this share of the work.
@@ -252,7 +256,26 @@ class _Prices:
     def _called(self, effort: Effort) -> float:
         """Cells that are added where light bends."""
         straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
-        return float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
+        called = float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
+        return self._coarser_than(max(called, 1.0)) * called
+
+    def _rounds(self, effort: Effort) -> float:
+        """Of finding where light bends: one sees that nothing is coarse, if so."""
+        if effort.coarsest <= 1.0:
+            return 0.0
+        return 1.0 + self._coarser_than(effort.triangles) * min(0.2 / effort.error, BEND_ROUNDS - 1.0)
+
+    def _coarser_than(self, cells: float) -> float:
+        """Share of the receivers' surface in triangles of their own that are larger than so many equal ones would be:
+        only these are split."""
+        return float(self._own_areas[self._own_areas * cells > 1.0].sum())
+
+    @cached_property
+    def _own_areas(self) -> Float64:
+        """Of the receivers' own triangles, as shares of all."""
+        receivers = self._unpriced.scene.receivers()
+        area = np.concatenate([triangle_geometry(o.vertices[o.triangles])[1] for o in receivers])
+        return np.asarray(area / max(float(area.sum()), np.finfo(float).tiny))
 
     def _coarse(self, effort: Effort) -> int:
         return self._count(max(int(effort.triangles / effort.coarsest), 1))
@@ -260,7 +283,7 @@ class _Prices:
     def _surveyed(self, effort: Effort) -> float:
         """Points that tell where light bends."""
         cells = self._coarse(effort) + self._called(effort) / 2.0
-        return _rounds(effort) * BEND_PASSES * cells
+        return self._rounds(effort) * BEND_PASSES * cells
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
@@ -298,9 +321,13 @@ class _Prices:
             onward = next((name for name in ONWARD if planned.active(name)), None)
             if onward:
                 works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
-        fits = (_BEND_FITS if surveyed else 0) + (1 if passes <= effort.passes else 2)
-        contours = cells if surveyed else 0.0
-        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=contours, rounds=_rounds(effort))}
+        # Each round has a fit of the cells that there are by then, and cuts them along contours, as the end does after
+        # more than one.
+        rounds = self._rounds(effort)
+        looked_at = surveyed / BEND_PASSES
+        fits = 1 + min(passes / effort.passes - 1.0, 1.0) + looked_at / max(cells, 1.0)
+        contours = looked_at + cells * float(np.clip(rounds - 1.0, 0.0, 1.0))
+        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=contours, rounds=rounds)}
 
     def _passes(self, effort: Effort, cells: float) -> float:
         if self._settings.error is None:
@@ -308,11 +335,10 @@ class _Prices:
         finer = cells / _TYPICAL_CELLS
         rays = effort.gather_rays / _TYPICAL_RAYS
         sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
+        if effort.coarsest > 1.0 and cells < effort.triangles:
+            # Triangles are added until what they leave is what was asked for, and no further.
+            rest = (_LEFT_TO_TRIANGLES * effort.error) ** 2
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
-
-
-def _rounds(effort: Effort) -> float:
-    return min(1.0 + 0.2 / effort.error, BEND_ROUNDS) if effort.coarsest > 1.0 else 0.0
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:

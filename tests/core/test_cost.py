@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from threading import Barrier
 
 import pytest
 
@@ -26,6 +27,14 @@ def test_the_machine_is_measured_on_the_scene(build):
     assert open_floor.reflected < 0.01
     assert (open_floor.threads, room.threads) == (1, 2)
     assert min(room.ray, room.number, open_floor.ray) > 0
+
+
+def test_threads_are_timed_while_all_of_them_are_busy(build, monkeypatch):
+    all_here = Barrier(2, timeout=10.0)
+    monkeypatch.setattr(cost, "_fastest", lambda _: all_here.wait() + 1.0)
+    # Neither the rays nor the numbers of one thread wait for those of the other.
+    assert calibrate(Pilot(build.furnished_room()), 2).number > 0.0
+    assert not all_here.broken
 
 
 def test_costs_add_up():

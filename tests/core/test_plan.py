@@ -9,13 +9,25 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.contours import Contours
 from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import unit_space
-from radiosity_baker.core.plan import LOOKING, choose_effort, gather_rays, plan, plan_with_prices, thriftier
+from radiosity_baker.core.pilot import Pilot
+from radiosity_baker.core.plan import (
+    LOOKING,
+    _Prices,
+    choose,
+    choose_effort,
+    gather_rays,
+    plan,
+    plan_with_prices,
+    thriftier,
+)
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SkyMap, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.survey import Survey
 from radiosity_baker.core.tessellation import triform, whole
 
 AXES = ((1.0, 0, 0), (0, 1.0, 0), (0, 0, 1.0))
@@ -284,3 +296,33 @@ def test_the_predicted_memory_is_what_large_meshes_take_within_half_as_much_agai
         tracemalloc.stop()
     # Embree's own is not among it, and neither is what lies about between arrays: that is no more than a third.
     assert 2 / 3 * held < foreseen < 1.5 * 4 / 3 * held
+
+
+def test_few_triangles_take_few_passes_where_light_calls_for_no_more(build, monkeypatch):
+    scene, asked = build.furnished_room(0.9), Settings(triangles=12_000, error=0.05, threads=2)
+    passes: list[int] = []
+    run_pass = Survey.run_pass
+    monkeypatch.setattr(Survey, "run_pass", lambda self: passes.append(self.passes) or run_pass(self))
+    cells = sum(len(o.triangles) for o in bake(scene, asked).objects)
+    # Those of the last survey, since it began anew.
+    taken = passes[::-1].index(0) + 1
+    chosen = choose(scene, asked, Pilot(scene))
+    prices = _Prices(chosen, asked, Machine(1e-7, 1e-8, 1.0, 2, reflected=0.8))
+    assert taken <= prices._passes(chosen.effort, cells) <= 2 * taken
+
+
+def test_a_fine_mesh_is_looked_at_once(build, monkeypatch):
+    scene = finely_modelled(build.furnished_room(), 0.2)
+    asked = Settings(triangles=1500, error=0.1, threads=2)
+    cut: list[int] = []
+    cut_receivers = Contours.cut
+    monkeypatch.setattr(Contours, "cut", lambda self, r: cut.append(len(r.cells)) or cut_receivers(self, r))
+    bake(scene, asked)
+    assert 0.5 < sum(work.contours for work in works_of(scene, asked)) / sum(cut) < 2.0
+
+
+def works_of(scene, asked):
+    """What the plan foresees."""
+    chosen, machine = choose(scene, asked, Pilot(scene)), Machine(1e-7, 1e-8, 1.0, 2, reflected=0.5)
+    prices = _Prices(chosen, asked, machine)
+    return prices._works(prices.of(chosen.effort)).values()
