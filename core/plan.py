@@ -282,6 +282,8 @@ class _Prices:
 
     def _surveyed(self, effort: Effort) -> float:
         """Points that tell where light bends."""
+        if effort.coarsest <= 1.0:
+            return 0.0
         cells = self._coarse(effort) + self._called(effort) / 2.0
         return self._rounds(effort) * BEND_PASSES * cells
 
