@@ -7,9 +7,10 @@ from __future__ import annotations
 import ctypes
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Barrier
+from threading import Barrier, BrokenBarrierError
 from time import perf_counter
 
 import numpy as np
@@ -24,6 +25,8 @@ from .scene import SceneError
 _CALIBRATION = 1 << 13
 #: Of these, rays from one point: as in a bake, where one after the other starts there.
 _LOOKS = 8
+#: Seconds that a thread waits for the others: a busy machine may not start them all.
+_PATIENCE = 1.0
 #: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers, of one that
 #: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
 _LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 40.0, 30.0, 600.0
@@ -96,7 +99,8 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     def taken(*_: object) -> tuple[float, float]:
         """Seconds for the rays and for the numbers. All threads start at once and are busy throughout, as in a bake:
         beside an idle core, or before another thread has woken up, the same takes half as long again, or less."""
-        together.wait()
+        with suppress(BrokenBarrierError):
+            together.wait(_PATIENCE)
         return _fastest(lambda: visibility.nearest(*rays)), _fastest(lambda: np.sort(numbers))
 
     hit = visibility.nearest(*rays)

@@ -65,6 +65,7 @@ class Hemispheres:
     tells rays that leave the scene apart.
     """
 
+    #: Rays with which `buried` looks from each point.
     BURIED_RAYS = 5
 
     def __init__(
