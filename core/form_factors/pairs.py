@@ -157,6 +157,8 @@ def rows_by_pairs(
             lost += np.bincount(side, amount[~kept], len(area))
         p, q, amount = p[kept], q[kept], amount[kept]
         share, rays = visible_share(faces, visibility, p, q, stream(seed, f"pairs {purpose}", number))
+        # No more of a pair is free than what lies open of both: few rays may say so of a patch that shows by a corner.
+        share = np.minimum(share, sides.open_share[faces.side[p]] * sides.open_share[faces.side[q]])
         amount *= share
         seen = share > 0.0
         return faces.side[p[seen]], faces.side[q[seen]], amount[seen], lost, rays

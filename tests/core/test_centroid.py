@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.form_factors.centroid import centroid_rows, quarters_share
+from radiosity_baker.core.form_factors.centroid import centroid_exchange, centroid_rows, quarters_share
 from radiosity_baker.core.form_factors.pairs import Estimate, Faces
 from radiosity_baker.core.parallel import Workers
 from radiosity_baker.core.patches import make_patches, split_objects, unit_space
@@ -69,3 +69,18 @@ def test_quarters_decide_the_visible_share() -> None:
         )
         assert share[0] == expected
         assert rays == 4
+
+
+def test_patches_that_show_by_a_corner_get_no_more_than_without_anything_in_the_way() -> None:
+    """Under a block they are a thirty-second of themselves, and what a quarter of them sees is more than that."""
+    low, high = np.array([0.255, 0.26, 0.0]), np.array([0.745, 0.74, 0.5])
+    vertices = np.concatenate([CORNERS, low + CORNERS * (high - low)])
+    found = estimate(vertices, np.concatenate([INWARD, INWARD[:, ::-1] + 8]), 400)
+    faces = Faces.of(found.sides)
+    assert len(faces.area) == len(found.rows)
+    assert found.sides.open_share.min() < 0.1
+    p, q = found.rows.owners(), found.rows.columns
+    face = np.empty(len(faces.area), dtype=np.int64)
+    face[faces.side] = np.arange(len(faces.area))
+    alone = centroid_exchange(faces, face[p], face[q]) / faces.area[face[p]]
+    assert (found.rows.weights <= alone * (1 + 1e-5)).all()
