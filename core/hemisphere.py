@@ -23,6 +23,8 @@ CHUNK_RAYS = 65536
 _PATTERN_RAYS, _FEWEST_PATTERNS = 16384, 256
 #: A turn about a normal that seldom runs along a wall.
 _ASKEW = 1.0
+#: Ways that tell whether a point is buried: up, and besides so far along and across, thus turned.
+BURIED_WAYS = ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1))
 
 
 @dataclass(frozen=True)
@@ -64,9 +66,6 @@ class Hemispheres:
     rng only chooses the set of patterns; every call draws its own patterns and turns from the stream it is given. sky:
     tells rays that leave the scene apart.
     """
-
-    #: Rays with which `buried` looks from each point.
-    BURIED_RAYS = 5
 
     def __init__(
         self, patches: Patches, visibility: Visibility, rays: int, rng: np.random.Generator, sky: Sky = DARK
@@ -151,20 +150,18 @@ class Hemispheres:
         return inside
 
     def buried(self, points: Float64, normals: Float64, within: Bool) -> Bool:
-        """Whether points (n, 3) lie inside a solid: of five ways, straight up and slanting to four sides, all but one
-        end at a back, or at a side that is known to be within a solid, by its code (c,). A ceiling may be the one.
-
-        Takes BURIED_RAYS rays of each.
+        """Whether points (n, 3) lie inside a solid: of the BURIED_WAYS, straight up and slanting to four sides, all but
+        one end at a back, or at a side that is known to be within a solid, by its code (c,). A ceiling may be the one.
         """
         origins, up = offset_along(points, normals), normals.astype(np.float32)
         turned = frames(up, np.full(len(up), _ASKEW, dtype=np.float32))
         ends = np.zeros(len(up), dtype=np.int64)
-        for along, across in ((0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)):
+        for along, across in BURIED_WAYS:
             ways = up + along * turned[:, 0] + across * turned[:, 1]
             hit = self._visibility.nearest(origins, ways)
             code = self._sides(hit, ways)
             ends += (hit >= 0) & (self.codes.of_backs(code) | within[code])
-        return np.asarray(ends >= self.BURIED_RAYS - 1)
+        return np.asarray(ends >= len(BURIED_WAYS) - 1)
 
     def _back(self, hit: Int32, directions: Float32) -> Bool:
         """Whether each ray has met the back of a patch."""

@@ -66,8 +66,8 @@ class Receivers:
     def element_corners(self) -> Float64:
         """(e, 3, 3) corners of the output triangles in the unit box."""
         # Not kept beside those of the cells: large meshes need the room.
-        whole = len(self.cells) == self.elements
-        return self.cells.corners if whole else _corners(self.meshes, self.space)
+        finer = len(self.cells) > self.elements
+        return _corners(self.meshes, self.space) if finer else self.cells.corners
 
     @property
     def element_shading(self) -> Float64:

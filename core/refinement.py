@@ -163,7 +163,8 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     receivers = survey.receivers
     fit = Fit(receivers, survey.lumped, survey.invalid)
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-    area, white = receivers.cells.area, np.mean((cell_colours(scene, receivers).albedo / np.pi) ** 2, axis=1)
+    colours = cell_colours(scene, receivers)
+    area, white = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
     in_sight = area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
 
@@ -172,8 +173,6 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
 
     fits = list(workers.each(fitted, sampled))
     light = _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), UNKNOWN, np.zeros(len(area)), fit)
-    # Once more, for large meshes need the room in between.
-    colours = cell_colours(scene, receivers)
     arriving = receivers.at_cells(light.arriving)
     # An error is of the colour of the light: in red light a red surface shows all of it, a blue one nothing.
     grey = arriving.mean(axis=1, keepdims=True)

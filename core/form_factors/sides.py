@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..hemisphere import Hemispheres
+from ..hemisphere import BURIED_WAYS, Hemispheres
 from ..patches import Patches
 from ..sampling import GOLDEN, plane_points, stream, triangle_points
 from ..scene import Bool, Float32, Float64, Int32
@@ -132,7 +132,7 @@ def open_parts(
         return Sides(patches, side, sides.points[:0], sides.normals[:0], sides.open_share[:0]), rays
     points, normals = site_points(patches, side, stream(seed, "probes " + purpose).random((len(side), 1, 3)), _PROBES)
     bare = ~hemispheres.buried(points.reshape(-1, 3), normals.reshape(-1, 3), within).reshape(-1, _PROBES)
-    rays["contact"] += hemispheres.BURIED_RAYS * bare.size
+    rays["contact"] += len(BURIED_WAYS) * bare.size
     found = bare.sum(axis=1)
     # The first of the bare points, over and over where there are not enough.
     order = np.argsort(~bare, axis=1, kind="stable")

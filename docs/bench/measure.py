@@ -6,9 +6,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from time import perf_counter, process_time, thread_time
-from typing import Any
+from typing import Any, TypeVar
 
 import bpy
 import numpy as np
@@ -25,6 +26,8 @@ from ...core.scene import Float64
 from ...core.settings import Settings
 from ...core.visibility import Visibility
 from .scenes import build, subdivide
+
+Measured = TypeVar("Measured")
 
 #: Of the points and of Cycles' paths; the bakes have others.
 _SEED = 7
@@ -98,11 +101,14 @@ def bake_often(
 ) -> Baked:
     """As `bake_once`, but a short bake so many times: what it took is the median of that. A long one needs no more,
     for what disturbs it now and then evens out."""
-    bakes = [bake_once(name, label, settings, reference, effort)]
-    while len(bakes) < times and bakes[0].run.seconds < _SHORT:
-        bakes.append(bake_once(name, label, settings, reference, effort))
-    middle = sorted((baked.run for baked in bakes), key=lambda run: run.seconds)[len(bakes) // 2]
-    return replace(bakes[-1], run=middle)
+
+    def once() -> tuple[float, Baked]:
+        baked = bake_once(name, label, settings, reference, effort)
+        return baked.run.seconds, baked
+
+    bakes = _often(once, times)
+    # Blender holds the meshes of the last one only.
+    return replace(bakes[-1][1], run=_middle(bakes)[1].run)
 
 
 def bake_once(
@@ -164,12 +170,7 @@ def cycles_runs(baked: Baked, samples: tuple[int, ...], reference: Reference, th
     """
     runs, values = [], []
     for count in samples:
-        took: list[tuple[float, float]] = []
-        while not took or (len(took) < times and took[0][0] < _SHORT):
-            begun, busy = perf_counter(), process_time()
-            corners = corner_bake(bpy.context, baked.copies, samples=count, seed=_SEED + count, threads=threads)
-            took.append((perf_counter() - begun, process_time() - busy))
-        seconds, busy = sorted(took)[len(took) // 2]
+        seconds, (busy, corners) = _middle(_often(partial(_cycles_once, baked, count, threads), times))
         objects = with_corners(baked.objects, baked.sources, corners)
         values.append(radiance_at(objects, reference.points)[reference.visible])
         triangles = sum(len(o.triangles) for o in objects)
@@ -177,6 +178,26 @@ def cycles_runs(baked: Baked, samples: tuple[int, ...], reference: Reference, th
     mean = reference.radiance[reference.visible].mean()
     last = np.mean((values[-1] - values[-2]) ** 2) / (1.0 / samples[-1] + 1.0 / samples[-2])
     return [replace(run, noise=float(np.sqrt(last / n)) / float(mean)) for run, n in zip(runs, samples, strict=True)]
+
+
+def _cycles_once(baked: Baked, samples: int, threads: int) -> tuple[float, tuple[float, list[Float64]]]:
+    """Seconds by the clock and of the processor, and the corners' light."""
+    begun, busy = perf_counter(), process_time()
+    corners = corner_bake(bpy.context, baked.copies, samples=samples, seed=_SEED + samples, threads=threads)
+    return perf_counter() - begun, (process_time() - busy, corners)
+
+
+def _often(once: Callable[[], tuple[float, Measured]], times: int) -> list[tuple[float, Measured]]:
+    """Seconds and what else came of it, of so many calls, or of one that is long."""
+    found = [once()]
+    while len(found) < times and found[0][0] < _SHORT:
+        found.append(once())
+    return found
+
+
+def _middle(found: list[tuple[float, Measured]]) -> tuple[float, Measured]:
+    """The one with the median seconds."""
+    return sorted(found, key=lambda one: one[0])[len(found) // 2]
 
 
 def _errors(objects: Any, reference: Reference | None) -> dict[str, float]:
