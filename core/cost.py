@@ -1,4 +1,4 @@
-"""What work costs on this machine: seconds from a few rays traced and numbers sorted here and now, memory from what is
+"""What work costs on this machine: seconds from a few rays traced and numbers summed here and now, memory from what is
 kept. The ratios were measured on the scenes of `make bench`; machines share them better than seconds.
 """
 
@@ -25,16 +25,18 @@ from .scene import SceneError
 _CALIBRATION = 1 << 13
 #: Of these, rays from one point: as in a bake, where one after the other starts there.
 _LOOKS = 8
+#: How often the rays are timed, and the numbers, which take so little that a moment's disturbance is all of it.
+_LONG, _BRIEF = 3, 20
 #: Seconds that a thread waits for the others: a busy machine may not start them all.
 _PATIENCE = 1.0
-#: Beyond Embree's own time, in numbers sorted by one thread. That all threads share: of a ray that gathers, of one that
+#: Beyond Embree's own time, in numbers summed by one thread. That all threads share: of a ray that gathers, of one that
 #: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
-_LOOK, _AIM, _FORM_FACTOR, _FIT = 12.0, 40.0, 30.0, 600.0
+_LOOK, _AIM, _FORM_FACTOR, _FIT = 24.0, 80.0, 60.0, 1200.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 15.0, 400.0, 900.0, 3300.0, 1700.0, 850.0
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 30.0, 800.0, 1800.0, 6600.0, 3400.0, 1700.0
 #: Of any bake, however small, and of any round of finding where light bends.
-_FIXED, _ROUND = 1.5e7, 1.2e7
+_FIXED, _ROUND = 3.0e7, 2.4e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
 _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 1700.0, 15_000.0, 600.0
 
@@ -64,7 +66,8 @@ class Work:
 @dataclass(frozen=True)
 class Machine:
     """How fast this machine is on one scene. ray: seconds that all threads together need for one; number: seconds that
-    one thread needs to sort one; closed: share of the rays that meet something; onward: that go on from there;
+    one thread needs to look one up and add it to a sum, as the rows of a sparse matrix do, which no processor has quick
+    instructions for that another lacks; closed: share of the rays that meet something; onward: that go on from there;
     reflected: mean over the rays of the albedo of what they meet, which is the share of all light that has bounced."""
 
     ray: float
@@ -94,14 +97,14 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     directions = directions / np.linalg.norm(directions, axis=1, keepdims=True) + patches.normals[chosen]
     origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
     rays = origins.astype(np.float32), directions.astype(np.float32)
-    numbers, together = rng.random(_CALIBRATION), Barrier(threads)
+    numbers, index, together = rng.random(_CALIBRATION), rng.permutation(_CALIBRATION), Barrier(threads)
 
     def taken(*_: object) -> tuple[float, float]:
         """Seconds for the rays and for the numbers. All threads start at once and are busy throughout, as in a bake:
         beside an idle core, or before another thread has woken up, the same takes half as long again, or less."""
         with suppress(BrokenBarrierError):
             together.wait(_PATIENCE)
-        return _fastest(lambda: visibility.nearest(*rays)), _fastest(lambda: np.sort(numbers))
+        return _fastest(lambda: visibility.nearest(*rays), _LONG), _fastest(lambda: np.cumsum(numbers[index]), _BRIEF)
 
     hit = visibility.nearest(*rays)
     onward = 0.0 if patches.optics is None else np.mean(patches.optics.goes_on[hit] & (hit >= 0))
@@ -113,10 +116,10 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     return Machine(ray, number, float(met), threads, float(onward), float(reflected))
 
 
-def _fastest(work: Callable[[], object]) -> float:
-    """Seconds of the fastest of three times: the first pays for memory, and another may be disturbed."""
+def _fastest(work: Callable[[], object], times: int) -> float:
+    """Seconds of the fastest of so many times: the first pays for memory, and others may be disturbed."""
     took = []
-    for _ in range(3):
+    for _ in range(times):
         begun = perf_counter()
         work()
         took.append(perf_counter() - begun)

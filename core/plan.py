@@ -63,6 +63,8 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 8_000, 1.75
+#: Where they are fewer than one in so many of the first cells, one round more finds them all: typical as well.
+_FEW_CALLED = 5.0
 #: Cells that triangles which are kept gain at most where light breaks, for each cell.
 _MOST_CROSSED = 0.25
 #: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
@@ -254,15 +256,20 @@ class _Prices:
 
     def _called(self, effort: Effort) -> float:
         """Cells that are added where light bends."""
-        straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
-        called = float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
+        called = self._called_by_light(effort)
         return self._coarser_than(max(called, 1.0)) * called
+
+    def _called_by_light(self, effort: Effort) -> float:
+        """The same if no triangle of the receivers' own were so small already."""
+        straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
+        return float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
 
     def _rounds(self, effort: Effort) -> float:
         """Of finding where light bends: one sees that nothing is coarse, if so."""
         if effort.coarsest <= 1.0:
             return 0.0
-        return 1.0 + self._coarser_than(effort.triangles) * min(0.2 / effort.error, BEND_ROUNDS - 1.0)
+        calling = _FEW_CALLED * self._called_by_light(effort) * effort.coarsest / max(effort.triangles, 1)
+        return 1.0 + self._coarser_than(effort.triangles) * min(0.2 / effort.error, BEND_ROUNDS - 1.0, calling)
 
     def _coarser_than(self, cells: float) -> float:
         """Share of the receivers' surface in triangles of their own that are larger than so many equal ones would be:

@@ -189,7 +189,7 @@ def test_asked_seconds_are_what_the_plan_says_where_that_is_possible(build):
 
 def test_less_time_makes_less_of_everything_but_what_the_mesh_has(build, monkeypatch):
     """A machine of a fixed speed, so that other programs have no say."""
-    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 1e-8, 1.0, 1))
+    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 5e-9, 1.0, 1))
     dense = Scene((build.sphere(level=5, inward=True),), (build.grey,), (LAMPS["point lamps"],))
     free, hurried = plan(dense, Settings()), plan(dense, Settings(error=None, seconds=0.7))
     assert free.seconds > 1.0
@@ -241,7 +241,7 @@ def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):
 def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, monkeypatch):
     calls = []
     monkeypatch.setattr(
-        "radiosity_baker.core.plan.calibrate", lambda *_: calls.append(1) or Machine(3e-7, 1e-8, 1.0, 1)
+        "radiosity_baker.core.plan.calibrate", lambda *_: calls.append(1) or Machine(3e-7, 5e-9, 1.0, 1)
     )
     planned, prices = plan_with_prices(build.furnished_room(), Settings(error=None, seconds=5.0))
     assert len(calls) == 1
