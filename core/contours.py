@@ -72,9 +72,9 @@ class _Edges:
     key: Float64
 
     @classmethod
-    def of(cls, receivers: Receivers, number: Int64) -> _Edges:
-        """Each edge by the first cell that has it; from its vertex with the lower number to the other."""
-        side = np.unique(number, return_index=True)[1]
+    def of(cls, receivers: Receivers, side: Int64) -> _Edges:
+        """The edges that sides (e,), as `numbered_edges` counts them, lie on; from the vertex with the lower number to
+        the other."""
         cell, corner = side // 3, side % 3
         vertex, each = receivers.cell_vertex[cell], np.arange(len(side))
         turned = vertex[each, corner] > vertex[each, (corner + 1) % 3]
@@ -175,14 +175,16 @@ class Contours:
         for _ in range(_PASSES):
             if not near.any():
                 break
-            number, _ = numbered_edges(receivers.cell_vertex)
-            edges = _Edges.of(receivers, number)
-            found = self._follow(receivers, edges, number, near)
+            number, _, side = numbered_edges(receivers.cell_vertex)
+            found = self._follow(receivers, number, side, near)
+            crossed = np.flatnonzero(np.isfinite(found.place))
+            edges, place, inward = _Edges.of(receivers, side[crossed]), found.place[crossed], found.inward[crossed]
             margin = _SNAP * size[source[edges.cell]] / np.maximum(edges.length, np.finfo(float).tiny)
-            place = _off_the_ends(found.place + _WITHIN * margin * found.inward, found.inward, margin)
             contoured |= np.isfinite(found.place)[number].any(axis=1)
-            receivers, piece = cut_cells(receivers, place[number])
-            near, contoured, source = np.isfinite(place[number]).any(axis=1)[piece], contoured[piece], source[piece]
+            found.place[crossed] = _off_the_ends(place + _WITHIN * margin * inward, inward, margin)
+            places = found.place[number]
+            receivers, piece = cut_cells(receivers, places)
+            near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
         return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
@@ -199,9 +201,10 @@ class Contours:
             near |= self._barred(middles, cells.corners[:, k])
         return np.asarray(near)
 
-    def _follow(self, receivers: Receivers, edges: _Edges, number: Int64, near: Bool) -> _Crossings:
-        """Where contours cross the edges (e,), followed from the near (c,) cells on."""
-        asked = np.zeros(len(edges.cell), dtype=bool)
+    def _follow(self, receivers: Receivers, number: Int64, side: Int64, near: Bool) -> _Crossings:
+        """Where contours cross the edges (e,) of each number (c, 3), on which sides (e,) lie; followed from the near
+        (c,) cells on."""
+        asked = np.zeros(len(side), dtype=bool)
         found = _Crossings.none(len(asked))
         while True:
             fresh = np.unique(number[near])
@@ -209,7 +212,7 @@ class Contours:
             if not len(fresh):
                 return found
             asked[fresh] = True
-            found[fresh] = self._find(receivers, edges.only(fresh))
+            found[fresh] = self._find(receivers, _Edges.of(receivers, side[fresh]))
             near = np.isfinite(found.place)[number].any(axis=1)
 
     def _find(self, receivers: Receivers, edges: _Edges) -> _Crossings:

@@ -299,11 +299,12 @@ def next_corner(corner: np.ndarray) -> np.ndarray:
     return np.asarray(corner - corner % 3 + (corner + 1) % 3)
 
 
-def numbered_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray]:
-    """The number (t, 3) of the edge from each corner to the next, and the vertices (e, 2) at the ends of each edge."""
+def numbered_edges(triangles: Int32) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The number (t, 3) of the edge from each corner to the next; of each edge the vertices (e, 2) at its ends, and the
+    first side (e,) that lies on it, 3 t + i from corner i of triangle t on."""
     count = int(triangles.max(initial=0)) + 1
-    keys, _, number = distinct(edge_keys(triangles, count).reshape(-1))
-    return number.reshape(-1, 3), np.column_stack([keys // count, keys % count])
+    keys, side, number = distinct(edge_keys(triangles, count).reshape(-1))
+    return number.reshape(-1, 3), np.column_stack([keys // count, keys % count]), side
 
 
 def _components(count: int, one: np.ndarray, two: np.ndarray) -> np.ndarray:

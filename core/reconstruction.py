@@ -160,7 +160,8 @@ class Fit:
         self._corner = receivers.corner_vertex[receivers.cells.element]
         self.measured = self._scatter(lumped) > _MEASURED
         self.hidden = ~self.measured & (self._scatter(np.repeat(hidden[:, None], 3, axis=1)) > 0)
-        self._edge, self._edge_ends = (number.astype(np.int32) for number in numbered_edges(receivers.corner_vertex))
+        edge, ends, _ = numbered_edges(receivers.corner_vertex)
+        self._edge, self._edge_ends = edge.astype(np.int32), ends.astype(np.int32)
         self.broken = receivers.broken
         self._both_known = self.measured[self._edge_ends].all(axis=1)
         self.filled = ~self.measured & self._beside_measured()

@@ -175,7 +175,7 @@ def test_the_sides_of_a_jump_join_its_vertices(floor):
     ends = np.stack([corner.ravel(), corner[:, [1, 2, 0]].ravel()], axis=1)[jumps.sides]
     wanted = jumps.vertices[:, [[0, 1], [0, 2], [1, 2], [0, 3], [1, 3]]]
     assert (np.sort(ends, axis=2) == np.sort(wanted, axis=2)).all()
-    edge, of_edge = numbered_edges(corner)
+    edge, of_edge, _ = numbered_edges(corner)
     assert (np.sort(of_edge[edge.ravel()[jumps.sides]], axis=2) == np.sort(wanted, axis=2)).all()
 
 
