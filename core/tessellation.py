@@ -70,7 +70,7 @@ def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
     corners = mesh.vertices[mesh.triangles]
     edges = corners[:, [1, 2, 0]] - corners
     marked = np.einsum("tij,tij->ti", edges, edges) > longest_edge * longest_edge
-    return _split(mesh, marked)[0] if marked.any() else mesh
+    return _split(mesh, marked)[0]
 
 
 def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int64]:
@@ -99,6 +99,8 @@ def cut_edges(mesh: Tessellation, places: Float64) -> tuple[Tessellation, Int64]
 def _split(mesh: Tessellation, marked: Bool, places: Float64 | None = None) -> tuple[Tessellation, Int64]:
     """Split the marked edges (t, 3): from corner 0 to 1, 1 to 2, 2 to 0. Both sides of an edge must agree, also on the
     place (t, 3), the midpoint unless given."""
+    if not marked.any():
+        return mesh, np.arange(len(marked))
     number = np.count_nonzero(marked, axis=1)
     # Children stand where their parent stood, so neighbours in space stay neighbours in memory.
     source = np.repeat(np.arange(len(number)), number + 1)
