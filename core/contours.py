@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -53,7 +54,7 @@ _SHADOW_RAYS, _RAYS = 8, 16
 #: The ends of a way along a surface are left out, lest it meets what bounds the surface.
 _BARRED_UP_TO = 0.98
 #: Points in a chunk; a number of streams that nothing else uses.
-_CHUNK, _STREAM = 8192, 4_000_000
+_CHUNK, _STREAM = 4096, 4_000_000
 #: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
 #: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
 _WHOLE, _BARRED, _COVERED = MOST_CONTOURED, 1 << 2 * MOST_CONTOURED, 1 << 2 * MOST_CONTOURED + 1
@@ -98,10 +99,12 @@ class _Edges:
 @dataclass(frozen=True, eq=False)
 class _Look:
     """On two sides of places: light (2, n), which is indirect; outlines (n,): where one side is inside a solid or has
-    something close above it, and the other has nothing within twice that, so that between them there is no slope."""
+    something close above it, and the other has nothing within twice that, so that between them there is no slope; rays
+    cast, by purpose."""
 
     light: Float64
     outlines: Bool
+    rays: Counter[str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,17 +303,19 @@ class Contours:
         every = edges.only(np.tile(np.arange(len(place)), 4))
         where = every.weights(np.concatenate([beside, ends]).ravel())
         points = Points(receivers.cells, every.cell, where)
-        found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
-        self.rays += found.rays
+        sides = 2 * len(place)
+        beside_contour = Points(receivers.cells, every.cell[:sides], where[:sides])
+        found, look = self._workers.beside(
+            partial(gather_direct, points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers),
+            partial(self._look, beside_contour, GAP * every.length[:sides], 0),
+        )
+        self.rays += found.rays + look.rays
         light, noise = found.grey.reshape(4, -1), np.sqrt(found.variance).mean(axis=1).reshape(4, -1)
         step = np.abs(light[0] - light[1])
         sharp = (step > _SHARP * np.abs(light[2] - light[3])) & (step > _CONTRAST * np.maximum(light[0], light[1]))
         sharp &= step > _SIGNIFICANT * np.hypot(noise[0], noise[1])
-        sides = 2 * len(place)
-        points = Points(receivers.cells, every.cell[:sides], where[:sides])
-        look = self._look(points, GAP * every.length[:sides], 0)
         one, other = light[:2] + look.light
-        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) :])
+        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) : sides])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
         return np.asarray(sharp | parted), look.outlines
 
@@ -319,14 +324,14 @@ class Contours:
         hides the light."""
         around = self._around
         if around is None:
-            return _Look(np.zeros((2, len(reach) // 2)), np.zeros(len(reach) // 2, dtype=bool))
+            return _Look(np.zeros((2, len(reach) // 2)), np.zeros(len(reach) // 2, dtype=bool), Counter())
         arriving, enclosed, rays = around.look(points, self._seed, _STREAM + number, self._workers)
         near, far = (
             around.hemispheres.covered(points.positions, points.normals, times * reach) for times in (1.0, 2.0)
         )
-        self.rays += rays + Counter(contact=2 * len(reach))
         hidden, open_ = (enclosed | near).reshape(2, -1), ~(enclosed | far).reshape(2, -1)
-        return _Look(arriving.reshape(2, -1), (hidden & open_[::-1]).any(axis=0))
+        outlines = (hidden & open_[::-1]).any(axis=0)
+        return _Look(arriving.reshape(2, -1), outlines, rays + Counter(contact=2 * len(reach)))
 
     def _breaks(self, receivers: Receivers, near: Bool, sight: Int64) -> Bool | None:
         """Sides (c, 3) of cells with a light that is in sight as a whole on one side and hidden on the other, with an
@@ -344,9 +349,13 @@ class Contours:
         weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
         weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
         points = Points(receivers.cells, side // 3, weights)
-        one, other = self._sight(points, None).reshape(2, -1)
+        sight, look = self._workers.beside(
+            partial(self._sight, points, None), partial(self._look, points, GAP * points.size, 1)
+        )
+        self.rays += look.rays
+        one, other = sight.reshape(2, -1)
         parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
-        broken = _part(one, other) | parted | self._look(points, GAP * points.size, 1).outlines
+        broken = _part(one, other) | parted | look.outlines
         breaks = np.zeros(3 * len(near), dtype=bool)
         breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
