@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,10 @@ from .textures import Colours, constant_colours, mean_colours, varies
 _SAME_NORMAL = np.cos(np.radians(5.0))
 #: Places in a texture, and corner colours, that differ by less than this are the same, but for rounding.
 _SAME_PLACE = 1e-4
+
+#: Of triangles: corners (t, 3, 3), normals (t, 3), areas (t,), and normals at the corners (t, 3, 3), None if all are
+#: flat.
+Shapes: TypeAlias = tuple[Float64, Float64, Float64, Float64 | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,17 +152,15 @@ def lay_out(
     front: Float64 | None = None,
     *,
     tessellate: bool,
+    shapes: Shapes | None = None,
 ) -> Receivers:
     """Cells on the triangles of the fine meshes, which become the output as well if `tessellate`.
 
-    front (surfaces, 3): Surface.front_share, None when all are one.
+    front (surfaces, 3): Surface.front_share, None when all are one. shapes: of those triangles, if they are known.
     """
     meshes = fine if tessellate else [whole(o.vertices, o.triangles) for o in objects]
     first = np.concatenate([[0], np.cumsum([len(m.triangles) for m in meshes])]).astype(np.int32)
-    corners = _corners(fine, space)
-    normals, area = triangle_geometry(corners)
-    flat = all(o.corner_normals is None for o in objects)
-    shading = None if flat else _shading(objects, fine, normals)
+    corners, normals, area, shading = shapes or _shapes(objects, fine, space)
     element, barycentric = np.arange(len(area), dtype=np.int32), None
     if not tessellate:
         element = np.concatenate([begin + m.parent for begin, m in zip(first, fine, strict=False)]).astype(np.int32)
@@ -175,6 +177,27 @@ def lay_out(
         first=first,
         element_surface=_surfaces(objects, meshes),
     )
+
+
+def _shapes(objects: tuple[SceneObject, ...], meshes: Sequence[Tessellation], space: Space) -> Shapes:
+    """Of the triangles of all meshes."""
+    corners = _corners(meshes, space)
+    normals, area = triangle_geometry(corners)
+    flat = all(o.corner_normals is None for o in objects)
+    return corners, normals, area, None if flat else _shading(objects, meshes, normals)
+
+
+def _shapes_of_pieces(receivers: Receivers, meshes: Sequence[Tessellation], source: Int64) -> Shapes:
+    """The same of triangles that each came from a cell (t,): most of these are whole, and look as they did."""
+    cells, cut = receivers.cells, np.bincount(source)[source] > 1
+    parts = np.split(cut, np.cumsum([len(m.triangles) for m in meshes])[:-1])
+    pieces = [m.only(part) for m, part in zip(meshes, parts, strict=True)]
+    shading = None if cells.shading is None else cells.shading[source]
+    shapes = cells.corners[source], cells.normals[source], cells.area[source], shading
+    for values, of_pieces in zip(shapes, _shapes(receivers.objects, pieces, receivers.space), strict=True):
+        if values is not None:
+            values[cut] = of_pieces
+    return shapes
 
 
 def _corners(meshes: Sequence[Tessellation], space: Space) -> Float64:
@@ -231,10 +254,16 @@ def _split_each(
         fine.append(split)
         sources.append(source + begin)
         begin = end
+    source = np.concatenate(sources)
     split_receivers = lay_out(
-        receivers.objects, fine, receivers.space, receivers.cells.front, tessellate=receivers.tessellated
+        receivers.objects,
+        fine,
+        receivers.space,
+        receivers.cells.front,
+        tessellate=receivers.tessellated,
+        shapes=_shapes_of_pieces(receivers, fine, source),
     )
-    return split_receivers, np.concatenate(sources)
+    return split_receivers, source
 
 
 def cell_colours(scene: Scene, receivers: Receivers) -> Colours:

@@ -40,6 +40,10 @@ class Tessellation:
     parent: Int32
     barycentric: Float64
 
+    def only(self, chosen: Bool) -> Tessellation:
+        """Some of the triangles (t,), of the same vertices."""
+        return Tessellation(self.vertices, self.triangles[chosen], self.parent[chosen], self.barycentric[chosen])
+
 
 def whole(vertices: Float64, triangles: Int32) -> Tessellation:
     """The tessellation that splits nothing."""
