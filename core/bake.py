@@ -19,8 +19,9 @@ from .direct.lamps import place
 from .direct.sky import divide_sky
 from .memory import Memory
 from .parallel import Workers
+from .patch_count import patches_wanted
 from .patch_refinement import patches_by_light
-from .patches import Space, make_patches, split_objects, unit_space
+from .patches import Patches, Space, make_patches, split_objects, unit_space
 from .pilot import Pilot
 from .plan import Effort, Plan, choose, price
 from .progress import Progress
@@ -29,8 +30,9 @@ from .refinement import Light, average_light, refine
 from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
+from .sky import Sky
 from .survey import Surroundings, Survey, look_up
-from .transport import solve_halves
+from .transport import Transport, solve_halves
 from .visibility import Visibility
 
 #: Triangles of the first look at the light.
@@ -67,8 +69,7 @@ def bake(
             chosen = choose(scene, settings, pilot, effort)
             scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
-            others = [place(lamp, space) for lamp in scene.lamps] + emitting_panels(around, space)
-            sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
+            others, of_sky, sky = sources(chosen, space)
             lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
@@ -76,21 +77,32 @@ def bake(
             check_cost(planned)
             effort = planned.effort
             clock.progress.expected = planned.seconds
+
+        def prepared(effort: Effort, pilot: Pilot) -> tuple[Patches, DirectLight]:
+            patches, visibility = patches_by_light(around, space, lights, effort, settings.seed, workers, pilot)
+            return patches, DirectLight(lights, visibility, settings.seed, effort.lights)
+
+        def solved(patches: Patches, direct_light: DirectLight) -> tuple[tuple[Transport, ...], Surroundings | None]:
+            visibility = direct_light.visibility
+            halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
+            return halves, look_up(patches, visibility, halves, sky, planned.effort, settings.seed)
+
         with clock.stage("tessellate", 0.03):
             start = max(int(effort.triangles / effort.coarsest), 1)
-            receivers, (patches, visibility) = workers.beside(
-                partial(make_receivers, scene, space, settings, start),
-                partial(patches_by_light, around, space, lights, effort, settings.seed, workers, pilot),
+            receivers, (patches, direct_light) = workers.beside(
+                partial(make_receivers, scene, space, settings, start), partial(prepared, effort, pilot)
             )
             del pilot  # it holds a copy of the scene
-            direct_light = DirectLight(lights, visibility, settings.seed, effort.lights)
         with clock.stage("transport", 0.1, until=0.28):
-            halves = solve_halves(patches, visibility, direct_light, sky, planned, workers, settings.seed)
-        surroundings = look_up(patches, visibility, halves, sky, effort, settings.seed)
+            halves, surroundings = solved(patches, direct_light)
+            wanted = patches_wanted(scene, receivers, direct_light, surroundings, effort, settings.seed, workers)
+            if wanted > effort.patches:
+                patches, direct_light = prepared(replace(effort, patches=wanted), Pilot(scene))
+                halves, surroundings = solved(patches, direct_light)
         sampled, sky_light = direct_light, None
         if of_sky and "sky" in settings.layers:
             sampled, sky_light = (
-                DirectLight(part, visibility, settings.seed, effort.lights) for part in (others, of_sky)
+                DirectLight(part, direct_light.visibility, settings.seed, effort.lights) for part in (others, of_sky)
             )
 
         def begun_on(some: Receivers) -> Survey:
@@ -107,6 +119,14 @@ def bake(
         memory.remember(given, settings, baked, light)
     with clock.stage("layers", 0.97):
         return baked.result(light, settings, clock)
+
+
+def sources(chosen: Plan, space: Space) -> tuple[list[Source], list[Source], Sky]:
+    """What light is asked for straight: lamps and emitting surfaces, and what of the sky; and the rest of the sky."""
+    scene = chosen.scene
+    others = [*(place(lamp, space) for lamp in scene.lamps), *emitting_panels(scene.surroundings(), space)]
+    sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
+    return others, of_sky, sky
 
 
 def first_light(

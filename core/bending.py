@@ -28,6 +28,9 @@ from .tessellation import Int64
 _SHARE = 0.5
 #: Squared error that is left of a cell once it is split: half where light steps, a sixteenth where it curves.
 _KEPT = 0.25
+#: Where there is no room for all, a cell is cut along a contour if the step there, squared, is so many times the
+#: squared error of a cell that is not split: a sixteenth of it is error, and a cut makes half as many cells as a split.
+_CUT = 6.0
 #: How often errors that are mostly noise are averaged with those around them.
 _BLURS = 2
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
@@ -57,20 +60,21 @@ class Bends:
     def refine(self, scene: Scene, receivers: Receivers, limit: int) -> Receivers:
         """The receivers with at most about `limit` cells, cut along contours, and finer where light still bends by more
         than is allowed."""
-        survey = None
+        survey, least = None, 0.0
         for number in range(BEND_ROUNDS):
-            trial, source = self._contours.cut(receivers)
+            trial, source = self._contours.cut(receivers, least)
             survey = self._surveyed(trial, number, survey)
             # The errors of small cells are known better: some room is left for those of later rounds.
             room = (limit - len(source)) // (1 if number == BEND_ROUNDS - 1 else 2)
             large = receivers.cells.area > _SMALLEST * receivers.cells.area.sum() / limit
-            chosen, enough = self._worst(scene, survey, source, large, room)
+            chosen, enough, spared = self._worst(scene, survey, source, large, room)
+            least = _CUT * spared
             if not chosen.any():
                 return trial
             receivers = split_cells(receivers, chosen)[0]
             if enough:
                 break
-        return self._contours.cut(receivers)[0]
+        return self._contours.cut(receivers, least)[0]
 
     def _surveyed(self, receivers: Receivers, number: int, earlier: Survey | None) -> Survey:
         """Samples of the receivers' cells, of those that an earlier survey had as well the same."""
@@ -84,10 +88,10 @@ class Bends:
         self.rays += survey.rays
         return survey
 
-    def _worst(self, scene: Scene, survey: Survey, source: Int64, large: Bool, room: int) -> tuple[Bool, bool]:
+    def _worst(self, scene: Scene, survey: Survey, source: Int64, large: Bool, room: int) -> tuple[Bool, bool, float]:
         """Of the large (c,) cells, from which those of the survey come, the ones with the largest squared error, so
         many that what is left is allowed, while there is room; and whether it will be once they are split, so that
-        nobody need look again."""
+        nobody need look again; and the largest squared error of those for which there is no room."""
         found = fit_samples(survey, scene, self._workers)
         direct, *indirect = (fitted.resolution for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
@@ -106,7 +110,9 @@ class Bends:
         uncut = max((allowed - _KEPT * total) / (1.0 - _KEPT), allowed / 2.0)
         chosen[until_allowed(squared, uncut, room)] = True
         chosen &= large
-        return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed)
+        left = np.maximum(squared, 0.0)[~chosen]
+        spared = float(left.max(initial=0.0, where=large[~chosen])) if left.sum() > uncut else 0.0
+        return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed), spared
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for

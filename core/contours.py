@@ -23,7 +23,7 @@ from .direct.illumination import MOST_CONTOURED, DirectLight
 from .gather import Points, gather_direct
 from .keys import key
 from .parallel import Workers
-from .receivers import Receivers, cut_cells, numbered_edges, shared_edges
+from .receivers import Receivers, cell_colours, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
 from .scene import Bool, Float64, Scene
 from .survey import GAP, Surroundings
@@ -110,21 +110,28 @@ class _Look:
 @dataclass(frozen=True, eq=False)
 class _Crossings:
     """Of edges (e,): a place from the first end to the second where a contour that matters crosses each, nan where none
-    does; and where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side.
+    does; where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side; and
+    by how much irradiance differs on the two sides.
     """
 
     place: Float64
     inward: Int64
+    step: Float64
 
     @classmethod
     def none(cls, count: int) -> _Crossings:
-        return cls(np.full(count, np.nan), np.zeros(count, dtype=np.int64))
+        return cls(np.full(count, np.nan), np.zeros(count, dtype=np.int64), np.zeros(count))
 
     def __setitem__(self, chosen: Int64 | Bool, found: _Crossings) -> None:
-        self.place[chosen], self.inward[chosen] = found.place, found.inward
+        for field in fields(self):
+            getattr(self, field.name)[chosen] = getattr(found, field.name)
 
     def __getitem__(self, chosen: Int64 | Bool) -> _Crossings:
-        return _Crossings(self.place[chosen], self.inward[chosen])
+        return _Crossings(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    def beside(self, other: _Crossings) -> _Crossings:
+        """These, and then the others."""
+        return _Crossings(*(np.append(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
 
 
 class _Known:
@@ -143,8 +150,7 @@ class _Known:
 
     def remember(self, keys: Float64, found: _Crossings) -> None:
         every, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
-        place, inward = np.append(self._found.place, found.place), np.append(self._found.inward, found.inward)
-        self._keys, self._found = every, _Crossings(place[first], inward[first])
+        self._keys, self._found = every, self._found.beside(found)[first]
 
 
 class Contours:
@@ -154,6 +160,7 @@ class Contours:
         self, scene: Scene, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers
     ) -> None:
         self.rays: Counter[str] = Counter()
+        self._scene = scene
         self._light = direct_light
         shading = [light for light in direct_light.lights if light.casts_shadow]
         self._lights = bool(shading) and len(direct_light.lights) <= MOST_CONTOURED
@@ -165,8 +172,10 @@ class Contours:
         self._seed = seed
         self._workers = workers
 
-    def cut(self, receivers: Receivers) -> tuple[Receivers, Int64]:
-        """The receivers with cells cut along the contours; and for each cell the one it came from."""
+    def cut(self, receivers: Receivers, least: float = 0.0) -> tuple[Receivers, Int64]:
+        """The receivers with cells cut along the contours; and for each new cell the one it came from. least: a shadow
+        is left alone where its step, squared, in radiance, times the area of the cell that it crosses is less.
+        """
         source = np.arange(len(receivers.cells))
         if self._nothing_to_find:
             return receivers, source
@@ -175,11 +184,16 @@ class Contours:
         near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         contoured = np.zeros(len(source), dtype=bool)
+        shown = receivers.cells.area * np.mean((cell_colours(self._scene, receivers).albedo / np.pi) ** 2, axis=1)
         for _ in range(_PASSES):
             if not near.any():
                 break
             number, _, side = numbered_edges(receivers.cell_vertex)
             found = self._follow(receivers, number, side, near)
+            # An edge is cut for the larger of the cells on its two sides.
+            weight = np.zeros(len(side))
+            np.maximum.at(weight, number.ravel(), np.repeat(shown[source], 3))
+            found.place[found.step**2 * weight < least] = np.nan
             crossed = np.flatnonzero(np.isfinite(found.place))
             edges, place, inward = _Edges.of(receivers, side[crossed]), found.place[crossed], found.inward[crossed]
             margin = _SNAP * size[source[edges.cell]] / np.maximum(edges.length, np.finfo(float).tiny)
@@ -226,9 +240,9 @@ class Contours:
         fresh = np.flatnonzero(~known)
         if len(fresh):
             some, place, inward = self._crossings(receivers, edges.only(fresh))
-            shadow, contact = self._matter(receivers, edges.only(fresh[some]), place)
-            matters = shadow | contact
-            found[fresh[some][matters]] = _Crossings(place[matters], (contact * inward)[matters])
+            step, contact = self._matter(receivers, edges.only(fresh[some]), place)
+            matters = step > 0.0
+            found[fresh[some][matters]] = _Crossings(place, contact * inward, step)[matters]
             self._known.remember(edges.key[fresh], found[fresh])
         return found
 
@@ -294,10 +308,11 @@ class Contours:
         self.rays += sum((rays for _, rays in found), Counter())
         return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
 
-    def _matter(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Bool, Bool]:
-        """Which of the crossed edges (e,) a sharp shadow crosses, and which the outline of what hides one side."""
+    def _matter(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
+        """How far light steps on the crossed edges (e,) where a sharp shadow or the outline of what hides one side
+        crosses them, 0 where neither does; and where it is an outline."""
         if not len(place):
-            return np.zeros(0, dtype=bool), np.zeros(0, dtype=bool)
+            return np.zeros(0), np.zeros(0, dtype=bool)
         ends = np.broadcast_to(_PLACES[[0, -1], None], (2, len(place)))
         beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), *ends)
         every = edges.only(np.tile(np.arange(len(place)), 4))
@@ -317,7 +332,9 @@ class Contours:
         one, other = light[:2] + look.light
         parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) : sides])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
-        return np.asarray(sharp | parted), look.outlines
+        step = np.where(sharp | parted, np.maximum(step, np.abs(one - other)), 0.0)
+        # What is hidden says nothing, so next to it all of the light may be wrong.
+        return np.where(look.outlines, np.maximum(np.maximum(one, other), np.finfo(float).tiny), step), look.outlines
 
     def _look(self, points: Points, reach: Float64, number: int) -> _Look:
         """Looks around from points (2 n,) on two sides of n places, of which something within reach (2 n,) above them

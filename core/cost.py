@@ -147,6 +147,12 @@ def refuse_larger_scene(triangles: int) -> None:
         )
 
 
+def patches_that_fit() -> float:
+    """How many patches half of the memory that is free would hold."""
+    free = free_memory_mb()
+    return np.inf if free is None else free * 1e6 / _PATCH_BYTES / 2.0
+
+
 def free_memory_mb() -> float | None:
     """How much memory this process may still take, in MB; None where the system does not tell."""
     if hasattr(ctypes, "windll"):

@@ -23,7 +23,7 @@ from .tessellation import Int64, split_triangles
 from .visibility import Visibility
 
 #: How often a patch is split into four at most, and how many times as many patches there may be in the end.
-_LEVELS, _GROWTH = 3, 2
+_LEVELS, _GROWTH = 6, 2
 #: How far light may vary inside a patch, relative to the mean: what patches send out is blurred by distance.
 _VARIATION = 0.5
 #: Standard deviations by which the largest and the smallest of some points must differ to mean a variation.

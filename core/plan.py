@@ -55,6 +55,8 @@ _LEFT_TO_TRIANGLES = 0.7
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
+#: Asked error from which on nobody looks whether patches leave more of it than they should: that costs what it brings.
+_ROUGH = 0.05
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6
 #: Openings are looked for where so large a part of the receivers sees little of the sky, and the rays of one point
@@ -86,8 +88,9 @@ class Effort:
 
     error: relative, to aim at; triangles: at most, where no size is asked for, or cells in those that are kept;
     coarsest: with how many times fewer adaptation starts; growth: how many times as many it may add where a size is
-    asked for; patches: wanted number; transport_rays: of a patch side; shadow_rays: to a lamp with size; lights: asked
-    at a point by each half of the rays where there are too many; gather_rays: of a sample point; passes over all cells
+    asked for; patches: wanted number; most_patches: up to how many there may be if those leave too much of the error, 0
+    for none; transport_rays: of a patch side; shadow_rays: to a lamp with size; lights: asked at a point by each half
+    of the rays where there are too many; gather_rays: of a sample point; passes over all cells
     before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
     uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
     triangles are too many to be lamps; channels: 3, or 1 where everything is grey.
@@ -99,6 +102,7 @@ class Effort:
     growth: float
     estimator: str
     patches: int
+    most_patches: int
     transport_rays: int
     shadow_rays: int
     lights: int
@@ -355,6 +359,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     finer = min(max(0.02 / asked, 0.1), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
+    may_add = settings.error is not None and settings.seconds is None and asked < _ROUGH
     # Where light bends is no guide to where a texture has its detail.
     textured = any(varies(scene, o) for o in scene.receivers())
     return Effort(
@@ -364,6 +369,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         growth=2.0,
         estimator=estimator,
         patches=patches,
+        most_patches=settings.triangles if estimator == "hemisphere" and may_add else 0,
         transport_rays=64,
         shadow_rays=4,
         lights=max(int(MOST_ASKED * min(0.02 / asked, 1.0)), _FEWEST_LIGHTS),

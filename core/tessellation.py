@@ -78,7 +78,8 @@ def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
 
 
 def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int64]:
-    """Split the chosen (t,) triangles into four, and their neighbours so that no crack opens.
+    """Split the chosen (t,) triangles into four, slivers into three along their length alone, and their neighbours so
+    that no crack opens.
 
     Also returns, for each new triangle, the one it came from.
     """
@@ -88,8 +89,16 @@ def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int
     near = np.flatnonzero(np.count_nonzero(at_chosen[mesh.triangles], axis=1) > 1)
     keys = edge_keys(mesh.triangles[near], len(mesh.vertices))
     marked = np.zeros(mesh.triangles.shape, dtype=bool)
-    marked[near] = np.isin(keys, keys[chosen[near]])
+    marked[near] = np.isin(keys, keys[chosen[near]][_long_edges(mesh, np.flatnonzero(chosen))])
     return _split(mesh, marked)
+
+
+def _long_edges(mesh: Tessellation, chosen: Int64) -> Bool:
+    """The edges (n, 3) of the chosen (n,) triangles that are at least half as long as their longest."""
+    corners = mesh.vertices[mesh.triangles[chosen]]
+    edges = corners[:, [1, 2, 0]] - corners
+    squared = np.einsum("tij,tij->ti", edges, edges)
+    return np.asarray(squared >= 0.25 * squared.max(axis=1, keepdims=True))
 
 
 def cut_edges(mesh: Tessellation, places: Float64) -> tuple[Tessellation, Int64]:
