@@ -124,9 +124,10 @@ def bake(
 def sources(chosen: Plan, space: Space) -> tuple[list[Source], list[Source], Sky]:
     """What light is asked for straight: lamps and emitting surfaces, and what of the sky; and the rest of the sky."""
     scene = chosen.scene
-    others = [*(place(lamp, space) for lamp in scene.lamps), *emitting_panels(scene.surroundings(), space)]
+    others: list[Source] = [place(lamp, space) for lamp in scene.lamps]
+    others += emitting_panels(scene.surroundings(), space)
     sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
-    return others, of_sky, sky
+    return others, list[Source](of_sky), sky
 
 
 def first_light(

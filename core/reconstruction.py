@@ -244,7 +244,9 @@ class Fit:
             values = np.clip(freer, low, high)
             pressed = np.where(held, matrix @ freer - system.target, 0.0)
             added = np.asarray(pressed + system.lumped[:, None] * (values - freer), dtype=np.float64)
-            values = self._passed_on(values, added, system.lumped, low, high)
+            # Few samples say anything of a small triangle: it must not take all that its neighbours may not have.
+            room = np.minimum(values, limits[0]), np.maximum(values, limits[1])
+            values = self._passed_on(values, added, system.lumped, *room)
         return self.fill(values)
 
     def _passed_on(self, values: Float64, added: Float64, weight: Float64, low: Float64, high: Float64) -> Float64:

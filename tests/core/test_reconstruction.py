@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -345,6 +347,19 @@ def test_limits_keep_the_mean_of_light_that_few_samples_find(floor):
     values = fit.solve_within(system, ALPHAS[0], fit.limits(samples))
     assert values.min() >= 0.0
     np.testing.assert_allclose(system.lumped @ values, system.target.sum(axis=0), rtol=2 * reconstruction._ADDED)
+
+
+def test_a_small_triangle_does_not_take_what_its_neighbours_may_not_have(floor):
+    """Noise asks for much smoothing at one vertex, which has no limits then, and next to nothing is a lot on a sliver.
+    Seen to fail: ninety thousand times the light around."""
+    samples = sample(floor, lambda points: np.full((len(points), 1), 100.0))
+    small = floor.vertices // 2
+    around = (floor.corner_vertex == small).any(axis=1)[floor.cells.element]
+    tiny = replace(floor.cells, area=np.where(around, 1e-5, 1.0) * floor.cells.area)
+    fit = fit_of(replace(floor, cells=tiny), samples.lumped)
+    alpha = np.where(np.arange(floor.vertices) == small, ALPHAS[-1], ALPHAS[0])
+    darkened = np.zeros((floor.vertices, 1)), np.full((floor.vertices, 1), 90.0)
+    assert fit.solve_within(fit.system(samples), alpha, darkened).max() < 130.0
 
 
 @pytest.mark.usefixtures("exactly")
