@@ -109,9 +109,9 @@ class Bends:
         # What is split adds to what is left; where it alone is more than is allowed, there will be another round.
         uncut = max((allowed - _KEPT * total) / (1.0 - _KEPT), allowed / 2.0)
         chosen[until_allowed(squared, uncut, room)] = True
+        left = np.maximum(squared[~chosen], 0.0)
+        spared = float(left.max(initial=0.0)) if left.sum() > uncut else 0.0
         chosen &= large
-        left = np.maximum(squared, 0.0)[~chosen]
-        spared = float(left.max(initial=0.0, where=large[~chosen])) if left.sum() > uncut else 0.0
         return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed), spared
 
     def _over_gaps(self, survey: Survey) -> Int64:

@@ -316,7 +316,9 @@ def test_a_fine_mesh_is_looked_at_once(build, monkeypatch):
     asked = Settings(triangles=1500, error=0.1, threads=2)
     cut: list[int] = []
     cut_receivers = Contours.cut
-    monkeypatch.setattr(Contours, "cut", lambda self, r: cut.append(len(r.cells)) or cut_receivers(self, r))
+    monkeypatch.setattr(
+        Contours, "cut", lambda self, r, *more: cut.append(len(r.cells)) or cut_receivers(self, r, *more)
+    )
     bake(scene, asked)
     assert 0.5 < sum(work.contours for work in works_of(scene, asked)) / sum(cut) < 2.0
 

@@ -96,7 +96,11 @@ def test_splitting_chosen_triangles_leaves_no_crack(closed, share):
         chosen = np.random.default_rng(int(100 * share)).random(len(mesh.triangles)) < share
         finer, source = split_triangles(mesh, chosen)
         assert is_closed(finer.triangles)
-        assert (np.bincount(source)[chosen] == 4).all()
+        a, b, c = mesh.vertices[mesh.triangles].transpose(1, 0, 2)
+        sides = np.linalg.norm([b - a, c - b, a - c], axis=2)
+        stout = chosen & (sides.min(axis=0) >= 0.5 * sides.max(axis=0))
+        assert (np.bincount(source)[stout] == 4).all()
+        assert (np.bincount(source)[chosen] >= 3).all()
         assert (np.bincount(source) <= 4).all()
         assert (mesh.parent[source] == finer.parent).all()
         assert np.bincount(source, areas(finer)) == pytest.approx(areas(mesh), rel=1e-12)
@@ -113,6 +117,16 @@ def test_only_neighbours_of_the_chosen_are_split(build):
     assert children[100] == 4
     assert np.count_nonzero(children == 2) == 3
     assert np.count_nonzero(children == 1) == len(children) - 4
+
+
+def test_a_sliver_is_split_along_its_length_alone(build):
+    """Ten times as long as it is wide, and so are its pieces if it is cut across as well."""
+    strip = build.quad(u=(10, 0, 0), v=(0, 1, 0))
+    finer, source = split_triangles(whole(strip.vertices, strip.triangles), np.ones(2, dtype=bool))
+    assert np.bincount(source).tolist() == [3, 3]
+    assert edges(finer).max() < 5.2
+    assert areas(finer) == pytest.approx([2.5, 2.5, 1.25] * 2, abs=1.3)
+    assert areas(finer).sum() == pytest.approx(10.0)
 
 
 def test_choosing_none_changes_nothing(closed):
