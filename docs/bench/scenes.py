@@ -121,11 +121,10 @@ _SAMPLES = Path(__file__).resolve().parents[2] / "sample_blends"
 
 
 def build(name: str) -> Objects:
-    """Start from an empty file, build the scene, or open the sample, and select what is to be baked."""
+    """Start from an empty file and build the scene, or open the sample; what is to be baked, selected."""
     if name in SAMPLES:
         bpy.ops.wm.open_mainfile(filepath=str(_SAMPLES / f"{name}.blend"), load_ui=False)
-        made = [obj for obj in bpy.context.scene.objects if obj.type == "MESH" and not obj.hide_render]
-        return _selected(made)
+        return list(bpy.context.selected_objects)  # those that the file means to be baked
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.context.scene.world = bpy.data.worlds.new("World")
     _world((0.0, 0.0, 0.0))
