@@ -88,15 +88,16 @@ def bake(
             return halves, look_up(patches, visibility, halves, sky, planned.effort, settings.seed)
 
         with clock.stage("tessellate", 0.03):
-            start = max(int(effort.triangles / effort.coarsest), 1)
             receivers, (patches, direct_light) = workers.beside(
-                partial(make_receivers, scene, space, settings, start), partial(prepared, effort, pilot)
+                partial(make_receivers, scene, space, settings, max(int(effort.triangles / effort.coarsest), 1)),
+                partial(prepared, effort, pilot),
             )
             del pilot  # it holds a copy of the scene
         with clock.stage("transport", 0.1, until=0.28):
             halves, surroundings = solved(patches, direct_light)
-            wanted = patches_wanted(scene, receivers, direct_light, surroundings, effort, settings.seed, workers)
+            wanted, spent = patches_wanted(scene, receivers, direct_light, surroundings, effort, settings.seed, workers)
             if wanted > effort.patches:
+                spent = sum((half.rays for half in halves), spent)
                 patches, direct_light = prepared(replace(effort, patches=wanted), Pilot(scene))
                 halves, surroundings = solved(patches, direct_light)
         sampled, sky_light = direct_light, None
@@ -112,6 +113,7 @@ def bake(
             survey = finer_where_it_matters(
                 begun_on, scene, receivers, direct_light, surroundings, effort, settings.seed, workers
             )
+            survey.rays += spent
             del receivers  # large meshes need the room
         baked = Baked(planned, patches, halves, survey)
         light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))

@@ -184,16 +184,14 @@ class Contours:
         near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         contoured = np.zeros(len(source), dtype=bool)
-        shown = receivers.cells.area * np.mean((cell_colours(self._scene, receivers).albedo / np.pi) ** 2, axis=1)
+        shown = self._shown(receivers) if least > 0.0 else None
         for _ in range(_PASSES):
             if not near.any():
                 break
             number, _, side = numbered_edges(receivers.cell_vertex)
             found = self._follow(receivers, number, side, near)
-            # An edge is cut for the larger of the cells on its two sides.
-            weight = np.zeros(len(side))
-            np.maximum.at(weight, number.ravel(), np.repeat(shown[source], 3))
-            found.place[found.step**2 * weight < least] = np.nan
+            if shown is not None:
+                found.place[found.step**2 * _larger_beside(shown[source], number) < least] = np.nan
             crossed = np.flatnonzero(np.isfinite(found.place))
             edges, place, inward = _Edges.of(receivers, side[crossed]), found.place[crossed], found.inward[crossed]
             margin = _SNAP * size[source[edges.cell]] / np.maximum(edges.length, np.finfo(float).tiny)
@@ -203,6 +201,11 @@ class Contours:
             receivers, piece = cut_cells(receivers, places)
             near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
         return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
+
+    def _shown(self, receivers: Receivers) -> Float64:
+        """What a squared step of the irradiance counts in each cell (c,): in radiance, times its area."""
+        albedo = cell_colours(self._scene, receivers).albedo
+        return np.asarray(receivers.cells.area * np.mean((albedo / np.pi) ** 2, axis=1))
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
         """Cells (c,) with others around them from whose middles other lights are in sight (c,), or that are covered."""
@@ -376,6 +379,13 @@ class Contours:
         breaks = np.zeros(3 * len(near), dtype=bool)
         breaks[side.reshape(2, -1)[:, broken]] = True
         return breaks.reshape(-1, 3)
+
+
+def _larger_beside(values: Float64, number: Int64) -> Float64:
+    """Of the values (c,) of the cells on both sides of each edge (e,), of a number (c, 3), the larger."""
+    larger = np.zeros(int(number.max()) + 1)
+    np.maximum.at(larger, number.ravel(), np.repeat(values, 3))
+    return larger
 
 
 def _part(one: Int64, other: Int64) -> Bool:

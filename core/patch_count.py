@@ -7,6 +7,8 @@ large, by far more than is asked for.
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 
 from .accuracy import COARSENING
@@ -38,18 +40,19 @@ def patches_wanted(
     effort: Effort,
     seed: int,
     workers: Workers,
-) -> int:
-    """How many patches leave no more than their share of the asked error, as far as so many may be and fit into memory.
+) -> tuple[int, Counter[str]]:
+    """How many patches leave no more than their share of the asked error, as far as so many may be and fit into memory;
+    and the rays that it took to tell.
 
     The error falls with the length of patches to the power of 1.5 (see `accuracy.COARSENING`), so with their number to
     the power of 3/4.
     """
     if surroundings is None or effort.most_patches < _LEAST * effort.patches:
-        return effort.patches
-    error = transport_error(scene, receivers, direct_light, surroundings, seed, workers)
+        return effort.patches, Counter()
+    error, rays = transport_error(scene, receivers, direct_light, surroundings, seed, workers)
     called = effort.patches * min((error / (_SHARE * effort.error)) ** (4.0 / 3.0), _MOST)
     wanted = int(min(called, effort.most_patches, patches_that_fit()))
-    return wanted if wanted >= _LEAST * effort.patches else effort.patches
+    return (wanted if wanted >= _LEAST * effort.patches else effort.patches), rays
 
 
 def transport_error(
@@ -59,17 +62,18 @@ def transport_error(
     surroundings: Surroundings,
     seed: int,
     workers: Workers,
-) -> float:
+) -> tuple[float, Counter[str]]:
     """Root mean square error of the radiance that patches leave on the receivers, relative to its mean, from points at
-    random."""
+    random; and the rays it took."""
     cells, rng = receivers.cells, stream(seed, "patch count")
     chosen = rng.choice(len(cells), _POINTS, p=cells.area / cells.area.sum())
     points = Points(cells, chosen, rng.dirichlet((1.0, 1.0, 1.0), _POINTS))
     direct = gather_direct(points, direct_light, 1, seed, _STREAM, workers)
-    around = surroundings.with_rays(_RAYS, rng)
+    around, rays = surroundings.with_rays(_RAYS, rng), direct.rays
     changes, arriving = [], direct.irradiance.mean(axis=1)
     for half, table in enumerate(around.tables):
-        found, *_ = gather_indirect(points, around.hemispheres, table, seed, _STREAM + half, workers)
+        found, _, _, cast = gather_indirect(points, around.hemispheres, table, seed, _STREAM + half, workers)
+        rays = rays + cast
         light, coarser = found[:, :-1], found[:, -1]
         changes.append(coarser - light[:, around.reflected].mean(axis=1))
         arriving = arriving + light @ around.to_grey / len(around.tables)
@@ -77,4 +81,4 @@ def transport_error(
     albedo, emission = (values[chosen].mean(axis=1) for values in (colours.albedo, colours.emission))
     mean = float(np.mean(emission + albedo * arriving / np.pi))
     squared = float(np.mean((albedo / np.pi) ** 2 * changes[0] * changes[1])) / COARSENING**2
-    return float(np.sqrt(max(squared, 0.0))) / mean if mean > 0.0 else 0.0
+    return float(np.sqrt(max(squared, 0.0))) / mean if mean > 0.0 else 0.0, rays

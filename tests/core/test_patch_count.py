@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import replace
 
 import pytest
@@ -32,8 +33,9 @@ def counted(monkeypatch, scene: Scene, settings: Settings) -> tuple[list[int], i
     wanted = []
 
     def asked(*arguments):
-        wanted.append(patches_wanted(*arguments))
-        return wanted[-1]
+        found = patches_wanted(*arguments)
+        wanted.append(found[0])
+        return found
 
     monkeypatch.setattr(pipeline, "patches_wanted", asked)
     return wanted, bake(scene, settings).report.patches
@@ -52,8 +54,9 @@ def test_they_bring_the_error_of_transport_down(monkeypatch):
     """By the power of 3/4 of their number, as far as its estimate is known."""
     settings = Settings(triangles=20_000, error=0.01, seed=3)
     finer = bake(shaded_lamp(), settings).report
-    monkeypatch.setattr(pipeline, "patches_wanted", lambda *given: given[4].patches)
+    monkeypatch.setattr(pipeline, "patches_wanted", lambda *given: (given[4].patches, Counter()))
     usual = bake(shaded_lamp(), settings).report
+    assert finer.rays["transport"] > 64 * 2 * (finer.patches + usual.patches)
     expected = (finer.patches / usual.patches) ** -0.75
     ratio = finer.estimated_error["transport"] / usual.estimated_error["transport"]
     assert ratio < expected * COARSENING
