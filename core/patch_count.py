@@ -24,10 +24,10 @@ from .survey import Surroundings
 
 #: Share of the asked error that patches may leave.
 _SHARE = 0.5
-#: How many times as many there may be at most, and are at least, for less is not worth solving anew.
-_MOST, _LEAST = 8.0, 1.5
-#: Points of the receivers that tell, and the rays of each.
-_POINTS, _RAYS = 4096, 16
+#: How many times as many there may be at most, and are at least: they come in leaps of that.
+_MOST, _LEAST = 8.0, 2.0
+#: Points of the receivers that are drawn, those of them that tell, and the rays of each.
+_DRAWN, _POINTS, _RAYS = 16_384, 4096, 16
 #: A number of streams that nothing else uses.
 _STREAM = 5_000_000
 
@@ -63,22 +63,31 @@ def transport_error(
     seed: int,
     workers: Workers,
 ) -> tuple[float, Counter[str]]:
-    """Root mean square error of the radiance that patches leave on the receivers, relative to its mean, from points at
-    random; and the rays it took."""
+    """Root mean square error of the radiance that patches leave on the receivers, relative to its mean; and the rays it
+    took.
+
+    Of points at random those are looked from that get much light straight, and fewer of the others, which count for
+    more: what shines most may be small.
+    """
     cells, rng = receivers.cells, stream(seed, "patch count")
-    chosen = rng.choice(len(cells), _POINTS, p=cells.area / cells.area.sum())
-    points = Points(cells, chosen, rng.dirichlet((1.0, 1.0, 1.0), _POINTS))
+    drawn = rng.choice(len(cells), _DRAWN, p=cells.area / cells.area.sum())
+    points = Points(cells, drawn, rng.dirichlet((1.0, 1.0, 1.0), _DRAWN))
     direct = gather_direct(points, direct_light, 1, seed, _STREAM, workers)
-    around, rays = surroundings.with_rays(_RAYS, rng), direct.rays
-    changes, arriving = [], direct.irradiance.mean(axis=1)
+    straight, rays = direct.irradiance.mean(axis=1), direct.rays
+    light = straight + max(float(straight.mean()), np.finfo(float).tiny)
+    chosen = rng.choice(_DRAWN, _POINTS, p=light / light.sum())
+    weight = float(light.mean()) / light[chosen]
+    around, changes, arriving = surroundings.with_rays(_RAYS, rng), [], straight[chosen]
     for half, table in enumerate(around.tables):
-        found, _, _, cast = gather_indirect(points, around.hemispheres, table, seed, _STREAM + half, workers)
+        found, _, _, cast = gather_indirect(
+            points.only(chosen), around.hemispheres, table, seed, _STREAM + half, workers
+        )
+        indirect, coarser = found[:, :-1], found[:, -1]
+        changes.append(coarser - indirect[:, around.reflected].mean(axis=1))
+        arriving = arriving + indirect @ around.to_grey / len(around.tables)
         rays = rays + cast
-        light, coarser = found[:, :-1], found[:, -1]
-        changes.append(coarser - light[:, around.reflected].mean(axis=1))
-        arriving = arriving + light @ around.to_grey / len(around.tables)
     colours = cell_colours(scene, receivers)
-    albedo, emission = (values[chosen].mean(axis=1) for values in (colours.albedo, colours.emission))
-    mean = float(np.mean(emission + albedo * arriving / np.pi))
-    squared = float(np.mean((albedo / np.pi) ** 2 * changes[0] * changes[1])) / COARSENING**2
+    albedo, emission = (values[drawn[chosen]].mean(axis=1) for values in (colours.albedo, colours.emission))
+    mean = float(np.mean(weight * (emission + albedo * arriving / np.pi)))
+    squared = float(np.mean(weight * (albedo / np.pi) ** 2 * changes[0] * changes[1])) / COARSENING**2
     return float(np.sqrt(max(squared, 0.0))) / mean if mean > 0.0 else 0.0, rays

@@ -1,4 +1,4 @@
-"""As many patches as a scene calls for: few where light comes from far, many in a shade around a bulb."""
+"""As many patches as a scene calls for: few where light comes from far, more where they leave too much of an error."""
 
 from __future__ import annotations
 
@@ -7,75 +7,82 @@ from dataclasses import replace
 
 import pytest
 
-from radiosity_baker.core import bake as pipeline
-from radiosity_baker.core import cost
-from radiosity_baker.core.accuracy import COARSENING
+from radiosity_baker.core import cost, patch_count
 from radiosity_baker.core.bake import bake
-from radiosity_baker.core.patch_count import patches_wanted
+from radiosity_baker.core.patch_count import patches_wanted, transport_error
 from radiosity_baker.core.plan import choose_effort
-from radiosity_baker.core.scene import PointLamp, Scene, Surface
 from radiosity_baker.core.settings import Settings
-from radiosity_baker.core.shapes import box, quad
 
-WHITE = Surface("white", (0.8, 0.8, 0.8))
-
-
-def shaded_lamp() -> Scene:
-    """A lamp in a shade of 20 cm that is open below, over a floor of 6 m: what is brightest is small and near."""
-    shade = box("shade", (-0.1, -0.1, 1.0), (0.1, 0.1, 1.3), inward=True)
-    shade = replace(shade, triangles=shade.triangles[2:], surface=shade.surface[2:])
-    lamp = PointLamp("lamp", (0, 0, 1.15), (10.0, 10.0, 10.0), 0.0)
-    return Scene((quad("floor", (-3, -3, 0), (6, 0, 0), (0, 6, 0)), shade), (WHITE,), (lamp,))
+ASKED = Settings(triangles=20_000, error=0.02)
 
 
-def counted(monkeypatch, scene: Scene, settings: Settings) -> tuple[list[int], int]:
-    """What the bake of a scene wanted, and how many patches it had."""
-    wanted = []
-
-    def asked(*arguments):
-        found = patches_wanted(*arguments)
-        wanted.append(found[0])
-        return found
-
-    monkeypatch.setattr(pipeline, "patches_wanted", asked)
-    return wanted, bake(scene, settings).report.patches
+@pytest.fixture
+def left(monkeypatch):
+    """Say what error patches leave, instead of looking."""
+    return lambda error: monkeypatch.setattr(patch_count, "transport_error", lambda *_: (error, Counter(gather=7)))
 
 
-def test_a_shade_around_a_lamp_calls_for_more_patches_and_a_room_does_not(build, monkeypatch):
-    settings = Settings(triangles=20_000, error=0.01)
-    usual = choose_effort(shaded_lamp(), settings).patches
-    (wanted,), patches = counted(monkeypatch, shaded_lamp(), settings)
-    assert 1.5 * usual < wanted <= 20_000
-    assert patches > 1.2 * usual
-    assert counted(monkeypatch, build.furnished_room(), settings)[0] == [usual]
+def wanted(scene, settings=ASKED) -> int:
+    return patches_wanted(scene, None, None, "something", choose_effort(scene, settings), 0, None)[0]
 
 
-def test_they_bring_the_error_of_transport_down(monkeypatch):
-    """By the power of 3/4 of their number, as far as its estimate is known."""
-    settings = Settings(triangles=20_000, error=0.01, seed=3)
-    finer = bake(shaded_lamp(), settings).report
-    monkeypatch.setattr(pipeline, "patches_wanted", lambda *given: (given[4].patches, Counter()))
-    usual = bake(shaded_lamp(), settings).report
-    assert finer.rays["transport"] > 64 * 2 * (finer.patches + usual.patches)
-    expected = (finer.patches / usual.patches) ** -0.75
-    ratio = finer.estimated_error["transport"] / usual.estimated_error["transport"]
-    assert ratio < expected * COARSENING
+def test_they_bring_the_error_under_half_of_what_is_asked(build, left):
+    scene = build.furnished_room()
+    usual = choose_effort(scene, ASKED).patches
+    for error, times in ((0.0, 1.0), (0.01, 1.0), (0.016, 1.0), (0.02, 2.0 ** (4 / 3))):
+        left(error)
+        assert wanted(scene) == int(times * usual)
+    left(0.5)
+    assert wanted(scene) == 20_000, "there are no more than triangles"
+    assert wanted(scene, replace(ASKED, triangles=10**6)) == 8 * usual
+
+
+def test_there_are_no_more_than_fit_into_memory(build, left, monkeypatch):
+    left(0.5)
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: 360.0)
+    assert wanted(build.furnished_room()) == 12_000
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: 30.0)
+    assert wanted(build.furnished_room()) == choose_effort(build.furnished_room(), ASKED).patches
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: None)
+    assert wanted(build.furnished_room()) == 20_000
+
+
+def test_a_bake_takes_as_many_and_counts_all_rays(build, left):
+    scene, settings = build.furnished_room(), replace(ASKED, triangles=9_000)
+    left(0.0)
+    usual = bake(scene, settings).report
+    left(0.05)
+    finer = bake(scene, settings).report
+    assert finer.patches > 1.6 * usual.patches
+    assert finer.rays["transport"] > usual.rays["transport"] * (1.0 + 0.9 * finer.patches / usual.patches)
+    assert finer.estimated_error["transport"] < usual.estimated_error["transport"]
+
+
+def test_what_they_leave_falls_with_their_number(build, monkeypatch):
+    """By less than the power of 3/4, for where direct light varies the few are split more often."""
+    found = []
+
+    def looked(*given):
+        found.append(transport_error(*given))
+        return found[-1]
+
+    monkeypatch.setattr(patch_count, "transport_error", looked)
+    scene = build.furnished_room()
+    for patches in (250, 2000):
+        few = replace(choose_effort(scene, ASKED), patches=patches, most_patches=2 * patches)
+        bake(scene, ASKED, effort=few)
+    (coarse, rays), (fine, _) = found
+    assert 1.3 < coarse / fine < 8.0
+    assert set(rays) >= {"gather", "shadow"}
 
 
 @pytest.mark.parametrize(
     "asked",
     [Settings(error=0.1), Settings(error=None, seconds=5.0), Settings(error=None), Settings(estimator="analytic")],
 )
-def test_nobody_looks_where_it_would_not_pay_or_there_is_no_time(asked):
-    assert choose_effort(shaded_lamp(), asked).most_patches == 0
-
-
-def test_there_are_no_more_than_fit_into_memory(monkeypatch):
-    settings = Settings(triangles=20_000, error=0.01)
-    monkeypatch.setattr("radiosity_baker.core.patch_count.patches_that_fit", lambda: 10.0)
-    usual = choose_effort(shaded_lamp(), settings).patches
-    assert counted(monkeypatch, shaded_lamp(), settings)[0] == [usual]
-    monkeypatch.setattr(cost, "free_memory_mb", lambda: 300.0)
-    assert cost.patches_that_fit() == pytest.approx(10_000.0)
-    monkeypatch.setattr(cost, "free_memory_mb", lambda: None)
-    assert cost.patches_that_fit() > 1e300
+def test_nobody_looks_where_it_would_not_pay_or_there_is_no_time(build, left, asked):
+    left(0.5)
+    usual = choose_effort(build.furnished_room(), asked)
+    assert usual.most_patches == 0
+    assert wanted(build.furnished_room(), asked) == usual.patches
+    assert patches_wanted(None, None, None, None, replace(usual, most_patches=10**6), 0, None)[0] == usual.patches
