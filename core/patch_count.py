@@ -74,7 +74,8 @@ def transport_error(
     points = Points(cells, drawn, rng.dirichlet((1.0, 1.0, 1.0), _DRAWN))
     direct = gather_direct(points, direct_light, 1, seed, _STREAM, workers)
     straight, rays = direct.irradiance.mean(axis=1), direct.rays
-    light = straight + max(float(straight.mean()), np.finfo(float).tiny)
+    # Direct light may be below zero where it is mostly noise.
+    light = np.maximum(straight, 0.0) + max(float(straight.mean()), np.finfo(float).tiny)
     chosen = rng.choice(_DRAWN, _POINTS, p=light / light.sum())
     weight = float(light.mean()) / light[chosen]
     around, changes, arriving = surroundings.with_rays(_RAYS, rng), [], straight[chosen]
