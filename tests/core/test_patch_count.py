@@ -79,7 +79,7 @@ def test_what_they_leave_falls_with_their_number(build, monkeypatch):
 
 def test_light_below_zero_is_noise(build, monkeypatch):
     """Seen to fail: a soft shadow's points had negative chances to be looked from."""
-    monkeypatch.setattr(patch_count, "gather_direct", lambda *given: replace_light(gather_direct(*given)))
+    monkeypatch.setattr(patch_count, "gather_direct", lambda *given: noisy(gather_direct(*given)))
     found = []
     monkeypatch.setattr(
         patch_count, "transport_error", lambda *given: found.append(transport_error(*given)) or found[-1]
@@ -88,8 +88,10 @@ def test_light_below_zero_is_noise(build, monkeypatch):
     assert found[0][0] > 0.0
 
 
-def replace_light(light):
-    return replace(light, irradiance=light.irradiance - 0.1 * light.irradiance.mean())
+def noisy(light):
+    irradiance = light.irradiance.copy()
+    irradiance[:10] -= 2.0 * irradiance.mean()
+    return replace(light, irradiance=irradiance)
 
 
 @pytest.mark.parametrize(
