@@ -128,8 +128,8 @@ def even_bake(name: str, triangles: int, passes: int, seed: int, reference: Refe
 def _plain_least_squares() -> Iterator[None]:
     """Neither smooth nor limited: the linear elements that are nearest to the samples."""
 
-    def none(fit: Fit, samples: Samples) -> tuple[Float64, Float64]:
-        most = np.full((len(fit.measured), len(samples.to_grey)), _ENDLESS)
+    def none(fit: Fit, *samples: Samples) -> tuple[Float64, Float64]:
+        most = np.full((len(fit.measured), len(samples[0].to_grey)), _ENDLESS)
         return -most, most
 
     with patch.object(Fit, "limits", none), patch.object(accuracy, "ALPHAS", (1e-3,)):
