@@ -69,7 +69,7 @@ def bake(
             chosen = choose(scene, settings, pilot, effort)
             scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
-            others, of_sky, sky = sources(chosen, space)
+            others, of_sky, sky = sources(chosen, around, space)
             lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
@@ -123,11 +123,11 @@ def bake(
         return baked.result(light, settings, clock)
 
 
-def sources(chosen: Plan, space: Space) -> tuple[list[Source], list[Source], Sky]:
+def sources(chosen: Plan, around: Scene, space: Space) -> tuple[list[Source], list[Source], Sky]:
     """What light is asked for straight: lamps and emitting surfaces, and what of the sky; and the rest of the sky."""
     scene = chosen.scene
     others: list[Source] = [place(lamp, space) for lamp in scene.lamps]
-    others += emitting_panels(scene.surroundings(), space)
+    others += emitting_panels(around, space)
     sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
     return others, list[Source](of_sky), sky
 

@@ -184,7 +184,8 @@ class Contours:
         near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         contoured = np.zeros(len(source), dtype=bool)
-        shown = self._shown(receivers) if least > 0.0 else None
+        # In radiance, squared, times the area.
+        shown = cell_colours(self._scene, receivers).shown_in_white * receivers.cells.area if least > 0.0 else None
         for _ in range(_PASSES):
             if not near.any():
                 break
@@ -201,11 +202,6 @@ class Contours:
             receivers, piece = cut_cells(receivers, places)
             near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
         return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
-
-    def _shown(self, receivers: Receivers) -> Float64:
-        """What a squared step of the irradiance counts in each cell (c,): in radiance, times its area."""
-        albedo = cell_colours(self._scene, receivers).albedo
-        return np.asarray(receivers.cells.area * np.mean((albedo / np.pi) ** 2, axis=1))
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
         """Cells (c,) with others around them from whose middles other lights are in sight (c,), or that are covered."""

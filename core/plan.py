@@ -90,10 +90,10 @@ class Effort:
     coarsest: with how many times fewer adaptation starts; growth: how many times as many it may add where a size is
     asked for; patches: wanted number; most_patches: up to how many there may be if those leave too much of the error, 0
     for none; transport_rays: of a patch side; shadow_rays: to a lamp with size; lights: asked at a point by each half
-    of the rays where there are too many; gather_rays: of a sample point; passes over all cells
-    before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
-    uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
-    triangles are too many to be lamps; channels: 3, or 1 where everything is grey.
+    of the rays where there are too many; gather_rays: of a sample point; passes over all cells before the error is
+    first estimated, boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the
+    solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be
+    lamps; channels: 3, or 1 where everything is grey.
     """
 
     error: float

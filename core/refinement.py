@@ -164,7 +164,7 @@ def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
     fit = Fit(receivers, survey.lumped, survey.invalid)
     sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
-    area, white = receivers.cells.area, np.mean((colours.albedo / np.pi) ** 2, axis=1)
+    area, white = receivers.cells.area, colours.shown_in_white
     in_sight = area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
 

@@ -71,9 +71,7 @@ def quarters(corners: Float64) -> Float64:
 
 
 def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
-    corners = mesh.vertices[mesh.triangles]
-    edges = corners[:, [1, 2, 0]] - corners
-    marked = np.einsum("tij,tij->ti", edges, edges) > longest_edge * longest_edge
+    marked = _squared_edges(mesh.vertices, mesh.triangles) > longest_edge * longest_edge
     return _split(mesh, marked)[0]
 
 
@@ -95,10 +93,15 @@ def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int
 
 def _long_edges(mesh: Tessellation, chosen: Int64) -> Bool:
     """The edges (n, 3) of the chosen (n,) triangles that are at least half as long as their longest."""
-    corners = mesh.vertices[mesh.triangles[chosen]]
-    edges = corners[:, [1, 2, 0]] - corners
-    squared = np.einsum("tij,tij->ti", edges, edges)
+    squared = _squared_edges(mesh.vertices, mesh.triangles[chosen])
     return np.asarray(squared >= 0.25 * squared.max(axis=1, keepdims=True))
+
+
+def _squared_edges(vertices: Float64, triangles: Int32) -> Float64:
+    """Squared lengths (t, 3) of the edges, from each corner to the next."""
+    corners = vertices[triangles]
+    edges = corners[:, [1, 2, 0]] - corners
+    return np.asarray(np.einsum("tij,tij->ti", edges, edges))
 
 
 def cut_edges(mesh: Tessellation, places: Float64) -> tuple[Tessellation, Int64]:

@@ -30,6 +30,11 @@ class Colours:
     albedo: Float64
     emission: Float64
 
+    @property
+    def shown_in_white(self) -> Float64:
+        """(n,) what a squared error of white irradiance counts in radiance, mean square over the channels."""
+        return np.asarray(np.mean((self.albedo / np.pi) ** 2, axis=1))
+
 
 def even_points(count: int) -> Float64:
     """(count, 3) barycentric centroids of the parts of a triangle whose edges are cut alike; count a square number."""
