@@ -127,7 +127,7 @@ def test_no_light_leaks_through_a_thin_wall(thickness):
     lamp = AreaLamp("lamp", (-1, 0, 1.2), (0.1, 0, 0), (0, 0.1, 0), (0, 0, 1), (10.0,) * 3)
     scene = Scene((rooms, wall, shelf), (GREY,), (lamp,))
     beyond = []
-    for seed in range(3):
+    for seed in range(6):
         baked = bake(scene, Settings(triangles=6000, error=0.05, threads=2, seed=seed)).objects[0]
         weights = np.random.default_rng(0).dirichlet(np.ones(3), size=(len(baked.triangles), 50))
         corners = baked.vertices[baked.triangles]
@@ -136,8 +136,8 @@ def test_no_light_leaks_through_a_thin_wall(thickness):
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)[:, None]
         here, there = ((at > 0.0) & (at < 0.1)) * area, ((at > 0.1 + thickness) & (at < 0.2)) * area
         beyond.append((light * there).sum() / there.sum() / ((light * here).sum() / here.sum()))
-    # It is 1.9 %, and differs by a fifth of that from seed to seed.
-    assert np.mean(beyond) < 0.025
+    # A sheet leaks 1.8 % in the mean of eight seeds, which differ by a sixth of that, and a wall of 1 mm 1.2 %.
+    assert np.mean(beyond) < 0.02
 
 
 def test_a_break_parts_the_vertices_of_an_edge_and_nothing_else():
