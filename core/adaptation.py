@@ -23,7 +23,8 @@ from .receivers import Receivers, split_cells
 from .sampling import stream
 from .scene import Bool, Float64
 from .splitting import until_allowed
-from .survey import GAP, Surroundings, Survey, out_of_sight
+from .surroundings import GAP, Surroundings, out_of_sight
+from .survey import Survey
 from .tessellation import Int64
 
 #: How often a cell is split into four at most.

@@ -31,7 +31,8 @@ from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
 from .sky import Sky
-from .survey import Surroundings, Survey, look_up
+from .surroundings import Surroundings, look_up
+from .survey import Survey
 from .transport import Transport, solve_halves
 from .visibility import Visibility
 

@@ -21,7 +21,8 @@ from .refinement import fit_samples
 from .sampling import stream, subseed
 from .scene import Bool, Float64, Scene
 from .splitting import until_allowed
-from .survey import GAP, Surroundings, Survey
+from .surroundings import GAP, Surroundings
+from .survey import Survey
 from .tessellation import Int64
 
 #: Share of the asked error that may be left to the triangles.

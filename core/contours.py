@@ -26,7 +26,7 @@ from .parallel import Workers
 from .receivers import Receivers, cell_colours, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
 from .scene import Bool, Float64, Scene
-from .survey import GAP, Surroundings
+from .surroundings import GAP, Surroundings
 from .tessellation import Int64
 from .visibility import offset_along
 

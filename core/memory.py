@@ -26,7 +26,8 @@ from .result import BakeResult
 from .scene import LAMP_COLOUR, Float64, Lamp, Scene
 from .settings import Settings
 from .sky import Sky
-from .survey import Survey, look_up
+from .surroundings import look_up
+from .survey import Survey
 from .transport import HALVES, Transport, fill_with_light
 
 #: A lamp that becomes so many times as bright would want triangles and samples of its own.

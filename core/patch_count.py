@@ -20,7 +20,7 @@ from .plan import Effort
 from .receivers import Receivers, cell_colours
 from .sampling import stream
 from .scene import Scene
-from .survey import Surroundings
+from .surroundings import Surroundings
 
 #: Share of the asked error that patches may leave.
 _SHARE = 0.5

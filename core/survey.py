@@ -7,8 +7,6 @@ as one half of the transport rays solved them, odd passes as the other half did:
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,27 +14,19 @@ from numpy.typing import NDArray
 
 from .direct.illumination import DirectLight, Illumination
 from .gather import Points, gather_direct, gather_indirect, shadow_boundary
-from .hemisphere import Hemispheres
 from .keys import same_cells
 from .parallel import Workers
-from .patches import Patches
 from .plan import Effort
 from .receivers import Receivers
 from .reconstruction import Samples
 from .sampling import stream
-from .scene import Bool, Float32, Float64
-from .sky import Sky
-from .transport import Transport
+from .scene import Bool, Float64
+from .surroundings import Surroundings, dark, out_of_sight
 from .visibility import Visibility
 
 #: Samples that are added at a time, and points beside shadow boundaries that are looked at together: many calls for few
 #: points each take longer than the light does.
 _CHUNK, _BESIDE = 8192, 65536
-#: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
-#: cell's size, one that gets less than half.
-_DARK, _DIM, GAP = 0.05, 0.5, 0.25
-#: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
-_LIT = 0.25
 #: Rays that tell whether hardly any light gets somewhere.
 _GLANCE = 16
 #: Of n rays of which none has met something, up to this over n may: at 95 % (rule of three: Hanley, Lippman-Hand 1983).
@@ -44,128 +34,6 @@ _NONE_OF_N = 3.0
 #: Where a triangle must be out of sight besides to count as buried: a hair inside its corners and the middles of its
 #: sides, for what shows of it beside a straight outline has a corner.
 _BESIDES = np.concatenate([0.997 * np.eye(3) + 1e-3, 0.4985 * (1.0 - np.eye(3)) + 1e-3])
-
-
-@dataclass(frozen=True, eq=False)
-class Surroundings:
-    """What rays from the receivers can bring.
-
-    tables: for each half of the transport (codes, columns) radiosity by ray code. The columns are reflected light, in
-    one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
-    first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
-    patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
-    lit (codes, 1): mean irradiance of what a ray meets, however dark its colour is. level_doubts: by what share of
-    itself each half may misjudge all reflected light, by its rays and by larger patches.
-    """
-
-    hemispheres: Hemispheres
-    tables: tuple[Float32, ...]
-    reflected: slice
-    sky: slice
-    emitted: slice
-    to_grey: Float64
-    lit: Float32
-    level_doubts: tuple[tuple[float, float], ...]
-
-    def with_rays(self, rays: int, rng: np.random.Generator) -> Surroundings:
-        """The same, looked at with another number of rays."""
-        return replace(self, hemispheres=self.hemispheres.with_rays(rays, rng))
-
-    def look(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Bool, Counter[str]]:
-        """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; whether
-        nearly only backs surround them; and the rays it took."""
-        table = self.tables[0][:, : len(self.to_grey)]
-        arriving, _, enclosed, rays = gather_indirect(points, self.hemispheres, table, seed, number, workers)
-        return arriving @ self.to_grey, enclosed, rays
-
-    def light_in_sight(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Counter[str]]:
-        """Mean irradiance (n,) of what is seen from the points, and the rays it took."""
-        seen, _, _, rays = gather_indirect(points, self.hemispheres, self.lit, seed, number, workers)
-        return seen[:, 0], rays
-
-
-def look_up(
-    patches: Patches,
-    visibility: Visibility,
-    halves: tuple[Transport, ...],
-    sky: Sky,
-    effort: Effort,
-    seed: int,
-) -> Surroundings | None:
-    """Tables of what the solved halves send to a ray, by what it meets; None when nothing was solved."""
-    if not halves:
-        return None
-    sky = sky.in_colour(patches.coloured)
-    seen, channels = sky.light.shape[1], effort.channels
-    by_rays = channels * effort.emitters_by_rays
-    return Surroundings(
-        hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"), sky),
-        tables=tuple(_table(half, sky, effort) for half in halves),
-        reflected=slice(0, channels),
-        sky=slice(channels, channels + seen),
-        emitted=slice(channels + seen, channels + seen + by_rays),
-        to_grey=np.concatenate(
-            [np.full(channels, 1 / channels), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / channels)]
-        ),
-        lit=_lit(halves[0], sky),
-        level_doubts=tuple(half.level_doubts() for half in halves),
-    )
-
-
-def _lit(half: Transport, sky: Sky) -> Float32:
-    met = half.by_code(half.solution.irradiance.mean(axis=1, keepdims=True))
-    return np.concatenate([met, np.zeros((len(sky.light), 1), dtype=np.float32)])
-
-
-def _table(half: Transport, sky: Sky, effort: Effort) -> Float32:
-    emitters, channels = effort.emitters_by_rays, effort.channels
-    emission = [np.pi * half.sides.emission[:, :channels]] if emitters else []
-    coarser = half.over_coarser_patches(half.reflected.mean(axis=1, keepdims=True))
-    no_sky = np.zeros((len(coarser), sky.light.shape[1]))
-    met = half.by_code(np.concatenate([half.reflected[:, :channels], no_sky, *emission, coarser], axis=1))
-    left = np.zeros((len(sky.light), met.shape[1]), dtype=np.float32)
-    left[:, channels : channels + no_sky.shape[1]] = sky.light
-    table = np.concatenate([met, left])
-    if emitters or not half.mirrored_emission:
-        return table
-    # Shadow rays do not find lamps in mirrors, so rays off mirrors bring what emitting surfaces send out.
-    emitted = half.by_code(np.pi * half.sides.emission)
-    off_mirrors = table.copy()
-    off_mirrors[: len(emitted), :3] += emitted
-    off_mirrors[: len(emitted), -1] += emitted.mean(axis=1)
-    return np.concatenate([table, off_mirrors])
-
-
-def out_of_sight(
-    points: Points,
-    around: Surroundings,
-    enclosed: Bool,
-    total: Float64,
-    direct: Float64,
-    mean: float,
-    look: Callable[[Points], Float64],
-) -> Bool:
-    """Points (n,) that nobody sees, whose dark says nothing of the surface around: inside a solid, or in a gap that is
-    much narrower than their cell, under what lies on the surface or nearly so.
-
-    A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
-    reaches count, and from which nothing is seen that light reaches, for a shadow in a dark room is in sight.
-    total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total. look: the mean
-    irradiance (n,) of what is seen from some points.
-    """
-    hidden = enclosed & dark(total, direct, mean)
-    doubtful = np.flatnonzero(hidden)
-    if len(doubtful):
-        hidden[doubtful] = look(points.only(doubtful)) <= _LIT * mean
-    dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
-    if len(dim):
-        hidden[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], GAP * points.size[dim])
-    return np.asarray(hidden)
-
-
-def dark(total: Float64, direct: Float64, mean: float) -> Bool:
-    """Points (n,) that get next to nothing of the mean light, and nothing straight from the sources."""
-    return np.asarray((total <= _DARK * mean) & (direct <= 0))
 
 
 def _halves(cells: int, to_grey: Float64) -> list[Samples]:
