@@ -13,27 +13,30 @@ All are root mean squares over the receivers' surface, relative to the mean radi
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from itertools import repeat
 from typing import Any
 
 import numpy as np
 
-from .reconstruction import Fit, Samples, within
+from .reconstruction import Fit, Samples, Smoothing, within
 from .scene import Float64
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A fit: alpha (v,); vertex values (v, k) of all samples together, and their mean light (v,); squared error of each
-    cell (c,) by sampling and by resolution, of the mean light."""
+    cell (c,) by sampling and by resolution, of the mean light; the mean light of the halves; how many samples of each
+    cell (c,) told so."""
 
     alpha: Float64
     values: Float64
     grey: Float64
     sampling: Float64
     resolution: Float64
+    halves: _Halves
+    tried: Float64
 
 
 @dataclass(frozen=True)
@@ -83,30 +86,64 @@ COARSENING = 3.0**0.75 - 1.0
 
 
 def fit_halves(
-    fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0, each: Callable[..., Any] = map
+    fit: Fit, halves: list[Samples], judged: Fitted, loose: float = 1.0, each: Callable[..., Any] = map
 ) -> Fitted:
-    """Fit with the alpha at which, around each vertex, each half of the samples best predicts the other
-    (cross-validation), judged by the mean light. area (c,) of the cells, as far as they are in sight; shown (c,): what
-    a squared error of the light there counts. loose: how many times as far as usual fits may be from the best. each: a
-    `map` that may use threads."""
+    """Fit with the alpha that `cross_validate` has found, in all channels. Of some cells there may be more samples
+    since. loose, each: as there."""
     limits, together = fit.limits(*halves), fit.system(*halves)
-    judged = _cross_validate(fit, halves, limits, area, shown, loose, each)
+    if (_tried(halves) > judged.tried).any():
+        judged = _with_more_samples(fit, halves, judged, limits, loose, each)
     start = _in_colour(judged.grey, fit.averages(together), halves[0].to_grey)
     light = fit.solve_within(together, judged.alpha, limits, start, loose, each)
     return replace(judged, values=light, grey=light @ halves[0].to_grey)
 
 
-def _cross_validate(
+def _with_more_samples(
     fit: Fit,
     halves: list[Samples],
+    judged: Fitted,
     limits: tuple[Float64, Float64],
-    area: Float64,
-    shown: Float64,
     loose: float,
     each: Callable[..., Any],
 ) -> Fitted:
-    """As `fit_halves`, but the values are still those of the mean light alone: half of what both halves have."""
-    to_grey = halves[0].to_grey
+    """What is judged, and the mean light of the halves, once some cells have more samples.
+
+    Whoever takes the light for a random function weighs its jumps by the variance of a sample over that of a jump
+    (Wahba 1978), so alpha falls as the number of samples grows.
+    """
+    before, now = (fit.receivers.vertex_means(tried) for tried in (judged.tried, _tried(halves)))
+    fewer = np.divide(before, now, out=np.ones_like(now), where=now > 0.0)
+    alpha = np.maximum(judged.alpha * fewer, np.minimum(judged.alpha, ALPHAS[0]))
+    systems = [fit.system(half.grey()) for half in halves]
+    start = judged.halves.first[:, None], judged.halves.second[:, None]
+    values = each(fit.solve, systems, repeat(alpha), start, repeat(_ROUGH * loose))
+    fitted = _Halves(*_shown(values, limits, alpha, halves[0].to_grey))
+    return replace(judged, alpha=alpha, halves=fitted, grey=fitted.mean, sampling=fitted.spread(fit) / 4.0)
+
+
+def _shown(
+    values: Iterable[Float64], limits: tuple[Float64, Float64], alpha: Smoothing, to_grey: Float64
+) -> tuple[Float64, ...]:
+    """Fits (v, 1) of the mean light as they would be shown (v,), within limits: a wild vertex with hardly a sample in
+    sight counts for little."""
+    low, high = (limit @ to_grey for limit in within(limits, alpha))
+    return tuple(np.clip(fitted[:, 0], low, high) for fitted in values)
+
+
+def _tried(halves: list[Samples]) -> Float64:
+    return np.asarray(halves[0].tried + halves[1].tried, dtype=np.float64)
+
+
+def cross_validate(
+    fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0, each: Callable[..., Any] = map
+) -> Fitted:
+    """The alpha at which, around each vertex, each half of the samples best predicts the other, judged by the mean
+    light; and that light: half of what both halves have.
+
+    area (c,) of the cells, as far as they are in sight; shown (c,): what a squared error of the light there counts.
+    loose: how many times as far as usual fits may be from the best. each: a `map` that may use threads.
+    """
+    to_grey, limits = halves[0].to_grey, fit.limits(*halves)
     grey = list(each(Samples.grey, halves))
     systems = list(each(fit.system, grey))
     tried: list[_Halves] = []
@@ -118,9 +155,7 @@ def _cross_validate(
         # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
         rough = _ROUGH * (loose if tried else 1.0)
         values = list(each(fit.solve, systems, repeat(alpha), best, repeat(rough), repeat(~smoother)))
-        # What is shown stays within these limits: a wild vertex with hardly a sample in sight counts for little.
-        low, high = (limit @ to_grey for limit in within(limits, alpha))
-        first, second = (np.clip(v[:, 0], low, high) for v in values)
+        first, second = _shown(values, limits, alpha, to_grey)
         predicted = sum(each(fit.squared_residual, grey, (second, first))) / 2
         if tried:
             # Cells beside a fit that stayed, which holds them back, have no say.
@@ -146,9 +181,8 @@ def _cross_validate(
         share = (own_level == number).mean(axis=1)
         sampling += share * smoothed.spread(fit) / 4.0
         unseen += share * smoothed.smoothed_by(sharpest, fit)
-    chosen = np.array(ALPHAS)[level]
-    mean = (best[0] + best[1]) / 2.0
-    return Fitted(chosen, mean, mean[:, 0], sampling, unseen)
+    last = _Halves(best[0][:, 0], best[1][:, 0])
+    return Fitted(np.array(ALPHAS)[level], last.mean[:, None], last.mean, sampling, unseen, last, _tried(halves))
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
@@ -165,6 +199,11 @@ class _Halves:
 
     first: Float64
     second: Float64
+
+    @property
+    def mean(self) -> Float64:
+        """(v,) half of what both have."""
+        return (self.first + self.second) / 2.0
 
     def spread(self, fit: Fit) -> Float64:
         """(c,) squared difference of the halves."""

@@ -17,7 +17,7 @@ from .gather import Points
 from .parallel import Workers
 from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
-from .refinement import fit_samples
+from .refinement import fit_samples, judge_samples
 from .sampling import stream, subseed
 from .scene import Bool, Float64, Scene
 from .splitting import until_allowed
@@ -93,7 +93,7 @@ class Bends:
         """Of the large (c,) cells, from which those of the survey come, the ones with the largest squared error, so
         many that what is left is allowed, while there is room; and whether it will be once they are split, so that
         nobody need look again; and the largest squared error of those for which there is no room."""
-        found = fit_samples(survey, scene, self._workers)
+        found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
         direct, *indirect = (fitted.resolution for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
         errors = [direct, *(_blurred(error, survey.receivers) for error in indirect)]

@@ -208,6 +208,7 @@ def _response(baked: Baked, name: str, alphas: tuple[Float64, ...], workers: Wor
     while alone.passes < survey.passes:
         alone.run_pass()
     alone.refine_boundaries(effort.boundary_passes)
+    alone.top_up(survey.indirect[0].tried + survey.indirect[1].tried)
     rays.update(alone.rays)
     return _Response(fit_alone(alone, alphas), tuple(halves))
 

@@ -155,7 +155,7 @@ class Fit:
     """
 
     def __init__(self, receivers: Receivers, lumped: Float64, hidden: Bool) -> None:
-        self._receivers = receivers
+        self.receivers = receivers
         self._count = receivers.vertices
         self._corner = receivers.corner_vertex[receivers.cells.element]
         self.measured = self._scatter(lumped) > _MEASURED
@@ -178,9 +178,9 @@ class Fit:
         """Mass matrix and right-hand side of sets of samples taken together, each cell weighing as much as its area in
         sight."""
         # A channel at a time: large meshes need the room.
-        weight = self._receivers.cells.area / np.maximum(_sum(s.tried for s in samples), 1)
+        weight = self.receivers.cells.area / np.maximum(_sum(s.tried for s in samples), 1)
         moments = _sum(s.moments for s in samples) * weight[:, None]
-        edges = self._edge[self._receivers.cells.element].ravel()
+        edges = self._edge[self.receivers.cells.element].ravel()
         channels, known = range(len(samples[0].to_grey)), self.measured
         light = (_sum(s.light[..., k] for s in samples) * weight[:, None] for k in channels)
         return System(
@@ -362,7 +362,7 @@ class Fit:
         jump, to which independent noise adds nothing on average."""
         penalty = SymmetricMatrix(self._pattern, self._penalty, self._pair_penalty)
         energy = (one * (penalty @ other) + other * (penalty @ one))[:, 0] / 2.0
-        around = self._scatter(np.repeat(self._receivers.cells.area[:, None] / 3.0, 3, axis=1))
+        around = self._scatter(np.repeat(self.receivers.cells.area[:, None] / 3.0, 3, axis=1))
         return np.asarray((energy / np.maximum(around, np.finfo(float).tiny))[self._corner].mean(axis=1))
 
     def at_corners(self, values: NDArray[Any], part: slice = slice(None)) -> NDArray[Any]:

@@ -10,15 +10,26 @@ from time import perf_counter
 
 import numpy as np
 
-from .accuracy import COARSENING, UNKNOWN, ErrorEstimate, Fitted, estimate_error, fit_halves, level_error
+from .accuracy import (
+    COARSENING,
+    UNKNOWN,
+    ErrorEstimate,
+    Fitted,
+    cross_validate,
+    estimate_error,
+    fit_halves,
+    level_error,
+)
 from .clock import Clock
+from .noise import samples_wanted
 from .parallel import Workers
-from .plan import Effort
+from .plan import HIDES_NOISE, Effort
 from .receivers import cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
 from .settings import Settings
 from .survey import Survey
+from .textures import Colours
 from .transport import in_three_channels
 
 #: Squared sampling error, relative to that of the rest, which no longer shows beside it.
@@ -127,7 +138,9 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
 
 def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
     """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
-    found, buried = workers.beside(partial(fit_samples, survey, scene, workers), survey.buried)
+    judged, buried = workers.beside(partial(judge_samples, survey, scene, workers), survey.buried)
+    hide_noise(survey, judged)
+    found = fit_samples(survey, judged, workers)
     transport = _squared_transport_error(survey, found.fits)
     error, cell_error = estimate_error(
         found.fits, transport, found.area, found.shown, found.radiance, survey.missed_sky
@@ -146,6 +159,18 @@ def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
 
 
 @dataclass(frozen=True, eq=False)
+class Judged:
+    """How smooth direct and, if any, indirect light are, on one structure. area (c,): of the cells, as far as they are
+    in sight; loose: how many times as far as usual fits may be from the best."""
+
+    fit: Fit
+    parts: list[Fitted]
+    colours: Colours
+    area: Float64
+    loose: float
+
+
+@dataclass(frozen=True, eq=False)
 class FittedSurvey:
     """The fits of direct and, if any, indirect light on one structure, and the light that they are, with nothing known
     of its error. area (c,): of the cells, as far as they are in sight; shown (c,): what a squared error of the mean
@@ -158,35 +183,51 @@ class FittedSurvey:
     radiance: float
 
 
-def fit_samples(survey: Survey, scene: Scene, workers: Workers) -> FittedSurvey:
-    """Fit all samples so far, as smoothly as each kind of light wants it."""
+def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:
+    """Find how smooth each kind of light is, from all samples so far."""
     receivers = survey.receivers
     fit = Fit(receivers, survey.lumped, survey.invalid)
-    sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
     colours = cell_colours(scene, receivers)
-    area, white = receivers.cells.area, colours.shown_in_white
-    in_sight = area * survey.share_in_sight
+    area = receivers.cells.area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
 
-    def fitted(halves: list[Samples]) -> Fitted:
-        return fit_halves(fit, halves, in_sight, white, loose, workers.each)
+    def judged(halves: list[Samples]) -> Fitted:
+        return cross_validate(fit, halves, area, colours.shown_in_white, loose, workers.each)
 
-    fits = list(workers.each(fitted, sampled))
-    light = _light(survey, [f.values for f in fits], tuple(f.alpha for f in fits), UNKNOWN, np.zeros(len(area)), fit)
+    return Judged(fit, list(workers.each(judged, survey.sampled)), colours, area, loose)
+
+
+def hide_noise(survey: Survey, judged: Judged) -> None:
+    """More samples of indirect light where its noise would show; whoever asks for little has it sooner without."""
+    if survey.surroundings and survey.error <= HIDES_NOISE:
+        seen = survey.receivers.at_cells(judged.parts[0].grey + judged.parts[1].grey)
+        survey.top_up(samples_wanted(judged.fit, survey.passes, judged.area, judged.parts[1].sampling, seen))
+
+
+def fit_samples(survey: Survey, judged: Judged, workers: Workers) -> FittedSurvey:
+    """Fit all samples so far, as smoothly as each kind of light was judged to want it."""
+
+    def fitted(halves: list[Samples], part: Fitted) -> Fitted:
+        return fit_halves(judged.fit, halves, part, judged.loose, workers.each)
+
+    receivers, area = survey.receivers, survey.receivers.cells.area
+    fits = list(workers.each(fitted, survey.sampled, judged.parts))
+    alphas, colours = tuple(f.alpha for f in fits), judged.colours
+    light = _light(survey, [f.values for f in fits], alphas, UNKNOWN, np.zeros(len(area)), judged.fit)
     arriving = receivers.at_cells(light.arriving)
     # An error is of the colour of the light: in red light a red surface shows all of it, a blue one nothing.
     grey = arriving.mean(axis=1, keepdims=True)
     tint = np.divide(arriving, grey, out=np.ones_like(arriving), where=grey > 0.0)
     shown = np.mean((tint * colours.albedo / np.pi) ** 2, axis=1)
     radiance = colours.emission + colours.albedo * arriving / np.pi
-    return FittedSurvey(fits, light, in_sight, shown, float(area @ radiance.mean(axis=1) / area.sum()))
+    return FittedSurvey(fits, light, judged.area, shown, float(area @ radiance.mean(axis=1) / area.sum()))
 
 
 def fit_alone(survey: Survey, alphas: tuple[Float64, ...]) -> Light:
     """The light with a smoothing that is given, and with nothing known of its error."""
     fit = Fit(survey.receivers, survey.lumped, survey.invalid)
     values = []
-    for halves, alpha in zip((survey.direct, survey.indirect), alphas, strict=False):
+    for halves, alpha in zip(survey.sampled, alphas, strict=True):
         values.append(fit.solve_within(fit.system(*halves), alpha, fit.limits(*halves)))
     dark = np.zeros(len(survey.receivers.cells))
     return _light(survey, values, alphas, UNKNOWN, dark, fit)
@@ -207,8 +248,7 @@ def average_light(survey: Survey) -> Light:
         channels = [np.bincount(corner, light[..., k].ravel(), count) / weight for k in range(light.shape[2])]
         return np.stack(channels, axis=1)
 
-    sampled = [survey.direct, survey.indirect] if survey.surroundings else [survey.direct]
-    return _light(survey, [mean(halves) for halves in sampled], (), UNKNOWN, np.zeros(len(cells)), None)
+    return _light(survey, [mean(halves) for halves in survey.sampled], (), UNKNOWN, np.zeros(len(cells)), None)
 
 
 def _light(

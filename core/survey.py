@@ -124,6 +124,11 @@ class Survey:
         return float(brings) * min(_NONE_OF_N / max(self.rays["gather"], 1), 1.0)
 
     @property
+    def sampled(self) -> list[list[Samples]]:
+        """The halves of direct light and, if there are surroundings, of indirect light."""
+        return [self.direct, self.indirect] if self.surroundings else [self.direct]
+
+    @property
     def tells_sky_apart(self) -> bool:
         """Whether the direct light has channels of its own for the sky's."""
         return self._sky_light is not None
@@ -195,15 +200,22 @@ class Survey:
         if len(total) == len(self.invalid):
             self.mean = float(total.mean())
 
+        valid = self._in_sight(around, number, points, total, direct, enclosed)
+        noise = (deviation[:, :columns] @ around.to_grey) ** 2
+        self._add(self.indirect[half], index, points, values, noise, valid)
+        return valid
+
+    def _in_sight(
+        self, around: Surroundings, number: int, points: Points, total: Float64, direct: Float64, enclosed: Bool
+    ) -> Bool:
+        """Which points (n,) are in sight; see `out_of_sight`."""
+
         def look(some: Points) -> Float64:
             seen, cast = (self._glance or around).light_in_sight(some, self.seed, 4_000_000 + number, self.workers)
             self.rays += cast
             return seen
 
-        valid = ~out_of_sight(points, around, enclosed, total, direct, self.mean, look)
-        noise = (deviation[:, :columns] @ around.to_grey) ** 2
-        self._add(self.indirect[half], index, points, values, noise, valid)
-        return valid
+        return ~out_of_sight(points, around, enclosed, total, direct, self.mean, look)
 
     def refine_boundaries(self, passes: int) -> None:
         """More points, for direct light only, in the cells where shadow boundaries leave it uncertain."""
@@ -224,6 +236,36 @@ class Survey:
         for one in np.split(np.arange(len(numbers)), passes):
             self._add_direct(self._extra, chosen, points.only(one), light.only(one), everywhere)
             self._extra += 1
+
+    def top_up(self, wanted: NDArray[np.int64]) -> None:
+        """More points, for indirect light only, in the cells in sight that have fewer than they should, an even number
+        (c,)."""
+        had = self.indirect[0].tried + self.indirect[1].tried
+        lacking = np.where(self.invalid, 0, np.maximum(wanted - had, 0)) // 2
+        if self.surroundings is not None and lacking.any():
+            for half in range(2):
+                self._top_up(self.surroundings, half, lacking)
+
+    def _top_up(self, around: Surroundings, half: int, samples: NDArray[np.int64]) -> None:
+        """So many more samples (c,) of the cells for one half of the indirect light."""
+        chosen = np.repeat(np.arange(len(samples)), samples)
+        turn = np.arange(len(chosen)) - np.repeat(np.cumsum(samples) - samples, samples)
+        number = 5_000_000 + int(self.indirect[half].tried.max())
+        points = Points.of_pass(self.receivers.cells, chosen, self.passes + 2 * turn + half, self._shift)
+        table = around.tables[half][:, : len(around.to_grey)]
+        looks = points, around.hemispheres, table, self.seed, number, self.workers
+        values, deviation, enclosed, rays = gather_indirect(*looks)
+        self.rays += rays
+        # Where one sample of a cell is lit and another buried, their mean tells nothing of this one.
+        direct = (self.direct[0].grey() + self.direct[1].grey()).mean_grey[chosen]
+        doubtful = np.flatnonzero(enclosed & (direct > 0.0))
+        if len(doubtful):
+            direct[doubtful] = self._direct(points.only(doubtful), number).grey
+        valid = self._in_sight(around, number, points, values @ around.to_grey + direct, direct, enclosed)
+        noise = (deviation @ around.to_grey) ** 2
+        for one in range(int(turn.max()) + 1):
+            now = np.flatnonzero(turn == one)
+            self._add(self.indirect[half], chosen[now], points.only(now), values[now], noise[now], valid[now])
 
     def buried(self) -> Bool:
         """Output triangles (e,) that lie inside a solid as a whole.

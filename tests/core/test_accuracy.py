@@ -11,6 +11,7 @@ from radiosity_baker.core.accuracy import (
     PARABOLA_BEND,
     STEP_BEND,
     _unresolved,
+    cross_validate,
     fit_halves,
     level_error,
     squared_mean,
@@ -107,7 +108,7 @@ def test_the_stated_error_is_the_true_one(floor, noise):
     for light in fronts(lambda t: np.clip(t / 0.1, 0, 1)):
         halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
         fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
-        fitted = fit_halves(fit, halves, floor.cells.area, one)
+        fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, one))
         stated += floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
         true += squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
     assert 0.7 < np.sqrt(stated / true) < 1.5
@@ -124,7 +125,7 @@ def test_light_is_smoothed_where_it_is_smooth(build):
 
     halves = [sample(floor, light, 2, rng, noise=0.2) for _ in range(2)]
     fit = Fit(floor, halves[0].lumped, everywhere)
-    fitted = fit_halves(fit, halves, floor.cells.area, np.ones(len(floor.cells)))
+    fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, np.ones(len(floor.cells))))
     place = np.zeros(floor.vertices)
     place[floor.corner_vertex] = floor.element_corners[..., 0]
     assert np.median(fitted.alpha[place > 0.3]) == ALPHAS[-1]
@@ -182,7 +183,10 @@ def test_a_loose_fit_is_off_by_no_more_than_it_may_and_threads_change_nothing(bu
     halves = [sample(floor, lambda points: 2.0 + points[:, 0], 2, rng, noise=0.3) for _ in range(2)]
     fit, area = Fit(floor, halves[0].lumped, every), floor.cells.area
     with Workers(2, Progress()) as workers:
-        loose, threaded = (fit_halves(fit, halves, area, np.ones(len(area)), 10.0, e) for e in (map, workers.each))
+        judged = (cross_validate(fit, halves, area, np.ones(len(area)), 10.0, each) for each in (map, workers.each))
+        loose, threaded = (
+            fit_halves(fit, halves, j, 10.0, each) for j, each in zip(judged, (map, workers.each), strict=True)
+        )
     assert loose.values.tobytes() == threaded.values.tobytes()
     system = fit.system(halves[0] + halves[1])
     matrix = fit.matrix(system, loose.alpha)

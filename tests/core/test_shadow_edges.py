@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core.accuracy import fit_halves
+from radiosity_baker.core.accuracy import cross_validate, fit_halves
 from radiosity_baker.core.patches import unit_space
 from radiosity_baker.core.receivers import Receivers, make_receivers
 from radiosity_baker.core.reconstruction import Fit, Samples
@@ -59,7 +59,8 @@ def test_a_shadow_edge_is_nearer_than_by_corner_sampling_and_near_the_best(build
     every = np.zeros(len(receivers.cells), dtype=bool)
     halves = [sampled(receivers, light, 16, seed) for seed in (0, 1)]
     area = receivers.cells.area
-    ours = fit_halves(Fit(receivers, halves[0].lumped, every), halves, area, np.ones(len(area))).grey
+    fit = Fit(receivers, halves[0].lumped, every)
+    ours = fit_halves(fit, halves, cross_validate(fit, halves, area, np.ones(len(area)))).grey
     dense = sampled(receivers, light, 200, 9)
     fit = Fit(receivers, dense.lumped, every)
     best = fit.solve(fit.system(dense), 0.0)[:, 0]

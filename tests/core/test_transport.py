@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from radiosity_baker.core import survey
+from radiosity_baker.core import surroundings
 from radiosity_baker.core.direct.emitters import emitting_panels
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
@@ -126,7 +126,7 @@ def test_the_inside_of_a_solid_on_the_ground_stays_dark(build, transport):
     assert inside.any()
     assert solved.solution.irradiance[outside].mean() > 1
     leaked, usual = solved.solution.irradiance[inside], solved.solution.irradiance[outside].mean()
-    assert leaked.max() <= survey._DARK / 5 * usual, "so that no point in there is taken for lit"
+    assert leaked.max() <= surroundings._DARK / 5 * usual, "so that no point in there is taken for lit"
     assert leaked.mean() <= 1e-3 * usual
 
 

@@ -1,0 +1,135 @@
+"""More samples where noise would show: in the dark, and where the light bends too much to be smoothed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radiosity_baker.core.accuracy import ALPHAS, cross_validate, fit_halves, squared_mean
+from radiosity_baker.core.bake import bake
+from radiosity_baker.core.noise import samples_wanted
+from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.receivers import make_receivers
+from radiosity_baker.core.reconstruction import Fit, Samples
+from radiosity_baker.core.scene import Scene
+from radiosity_baker.core.settings import Settings
+from radiosity_baker.core.survey import Survey
+
+
+@pytest.fixture(scope="module")
+def floor(build):
+    scene = Scene((build.quad(),), (build.grey,))
+    return make_receivers(scene, unit_space(scene), Settings(), 3000)
+
+
+@pytest.fixture(scope="module")
+def fit(floor):
+    return Fit(floor, np.ones((len(floor.cells), 3)), np.zeros(len(floor.cells), bool))
+
+
+def across(floor):
+    """(c,) where the cells lie, from -1 to 1."""
+    return floor.cells.corners.mean(axis=1)[:, 0]
+
+
+@pytest.fixture(scope="module")
+def floors(build):
+    """The fit of two floors, the second with a hundredth of the first one's area; and which cells (c,) are of it."""
+    small = build.quad("small", (2, 0, 0), (0.1, 0, 0), (0, 0.1, 0))
+    scene = Scene((build.quad(), small), (build.grey,))
+    made = make_receivers(scene, unit_space(scene), Settings(), 6000)
+    second = np.arange(len(made.cells)) >= len(made.fine[0].triangles)
+    return Fit(made, np.ones((len(made.cells), 3)), np.zeros(len(made.cells), bool)), made.cells.area, second
+
+
+def test_noise_is_even_where_its_variance_is_in_proportion_to_the_light(floors):
+    fit, area, small = floors
+    light = np.where(small, 0.1, 1.0)
+    assert (samples_wanted(fit, 2, area, 0.01 * light, light) == 2).all()
+
+
+@pytest.mark.parametrize(("darker", "times"), [(8.0, 8), (64.0, 16)])
+def test_a_dark_place_as_noisy_as_a_bright_one_gets_more_samples_as_it_is_darker_but_16_times_at_most(
+    floors, darker, times
+):
+    """What is next to it is no part of it, and has as many as before."""
+    fit, area, small = floors
+    wanted = samples_wanted(fit, 2, area, np.full(len(area), 0.01), np.where(small, 1.0 / darker, 1.0))
+    assert (wanted[small] == 2 * times).all()
+    assert (wanted[~small] == 2).all()
+
+
+def test_no_more_than_half_as_many_again_are_wanted_in_all(floor, fit):
+    wanted = samples_wanted(
+        fit, 2, floor.cells.area, np.full(len(floor.cells), 0.01), np.where(across(floor) > 0.0, 1e-3, 1.0)
+    )
+    assert 2.2 < wanted.mean() <= 3.0
+
+
+def test_in_the_dark_nothing_is_wanted(floor, fit):
+    dark = np.zeros(len(floor.cells))
+    assert (samples_wanted(fit, 2, floor.cells.area, dark, dark) == 2).all()
+
+
+def noisy(floor, light, more, rng):
+    """Samples of a light with noise of 0.2 in every cell, and so many more in some (c,)."""
+    count = len(floor.cells)
+    samples = Samples(count, np.ones(1))
+
+    def add(cells):
+        weights = rng.dirichlet(np.ones(3), len(cells))
+        points = np.einsum("nc,nck->nk", weights, floor.cells.corners[cells])
+        values = light(points) + 0.2 * rng.standard_normal(len(cells))
+        samples.add(cells, weights, values[:, None], np.full(len(cells), 0.04), np.ones(len(cells), bool))
+
+    add(np.arange(count))
+    for _ in range(more):
+        add(np.flatnonzero(across(floor) > 0.0))
+    return samples
+
+
+def test_after_more_samples_the_fit_is_as_much_better_and_says_so(floor):
+    """Seven more samples for each on half of a flat floor: a light that bends everywhere is fitted with less smoothing
+    there, is nearer to the truth, and the stated error of sampling is the true one."""
+
+    def light(points):
+        return 1.0 + 0.5 * np.sin(6.0 * np.pi * points[:, 1])
+
+    def halves(more, seed):
+        return [noisy(floor, light, more, np.random.default_rng(2 * seed + k)) for k in range(2)]
+
+    area, one = floor.cells.area, np.ones(len(floor.cells))
+    right, place = across(floor) > 0.1, np.zeros(floor.vertices)
+    place[floor.corner_vertex] = floor.element_corners[..., 0]
+    few, many = halves(0, 1), halves(7, 1)
+    fit = Fit(floor, few[0].lumped, np.zeros(len(area), bool))
+    judged = cross_validate(fit, few, area, one)
+    before, after = fit_halves(fit, few, judged), fit_halves(fit, many, judged)
+    truth = np.zeros(floor.vertices)
+    truth[floor.corner_vertex] = light(floor.element_corners.reshape(-1, 3)).reshape(-1, 3)
+
+    def error(fitted):
+        return np.sqrt(np.mean((fitted.grey - truth)[place > 0.1] ** 2))
+
+    assert np.allclose(after.alpha[place < -0.1], before.alpha[place < -0.1])
+    least = np.minimum(before.alpha, ALPHAS[0])
+    assert np.allclose(after.alpha[place > 0.1], np.maximum(before.alpha / 8.0, least)[place > 0.1])
+    assert error(after) < 0.75 * error(before)
+    again = fit_halves(fit, halves(7, 2), replace(judged))
+    apart = squared_mean(fit.at_corners(after.grey - again.grey)) / 2.0
+    stated, true = (np.sqrt(area[right] @ squares[right] / area[right].sum()) for squares in (after.sampling, apart))
+    assert stated == pytest.approx(true, rel=0.15)  # some 400 degrees of freedom each: 3.5 % deviation
+
+
+def test_a_bake_looks_longer_where_its_noise_would_show_but_not_if_little_is_asked(build, monkeypatch):
+    """The sides of the box get no light straight from the lamp."""
+    longer = []
+    monkeypatch.setattr(Survey, "top_up", lambda survey, wanted: longer.append((survey, wanted)))
+    for error in (0.05, 0.1):
+        bake(build.furnished_room(), Settings(triangles=3000, error=error))
+    ((survey, wanted),) = longer
+    dark = survey.direct[0].light.sum(axis=(1, 2)) == 0.0
+    assert wanted.max() > 2
+    assert wanted[dark].mean() > wanted[~dark].mean()
