@@ -1,9 +1,8 @@
-"""Where noise would show, and how many samples of indirect light hide it.
+"""How many more samples of indirect light, and where, hide its noise best.
 
 An error counts by its square all over the surface, but an eye sees it against the light around it: blotches that nobody
 notices on a lit wall are the first thing to be seen on a dark one. What a display shows goes about as the square root
-of the light, so a step dL shows as dL / sqrt(L), and noise is even to the eye where its variance is in proportion to
-the light.
+of the light, so a step dL shows as dL / sqrt(L), and a variance as itself over the light.
 """
 
 from __future__ import annotations
@@ -14,23 +13,40 @@ from .reconstruction import Fit
 from .scene import Float64
 from .tessellation import Int64
 
-#: How many times as many samples as usual a cell gets at most; and all cells together, beside those they have.
-_MOST, _MOST_TOGETHER = 16.0, 0.5
-#: By how much fewer are tried, if those were too many.
-_STEP = 1.25
+#: How many times as many samples as usual a cell gets at most.
+_MOST = 16.0
+#: What gets less than this share of the mean light is no darker to the eye.
+_BLACK = 1e-3
+#: How often the number of samples is halved in on: from a factor of a million to one of 1.01.
+_BISECTIONS = 11
 
 
-def samples_wanted(fit: Fit, usual: int, area: Float64, noise: Float64, light: Float64) -> Int64:
-    """How many samples (c,), an even number, each cell should have where the usual number leaves some noise, so that it
-    shows no more there than elsewhere.
+def samples_wanted(fit: Fit, usual: int, more: float, area: Float64, noise: Float64, light: Float64) -> Int64:
+    """How many samples (c,), an even number, each cell should have where the usual number leaves some noise, if there
+    are so many times as many as usual more to be had in all.
 
-    area (c,) of the cells; noise (c,): squared error of the fitted light; light (c,): how bright it is.
+    Noise shows least in all where the number of samples goes as the root of the variance that each stands for (Neyman
+    1934): a large triangle needs more than a small one. area (c,) of the cells; noise (c,): squared error of the fitted
+    light; light (c,): how bright it is.
     """
-    shown = fit.at_corners(fit.nearby(area * noise)).mean(axis=1) * float(area @ light)
-    fair = fit.at_corners(fit.nearby(area * light)).mean(axis=1) * float(area @ noise)
-    share = np.divide(shown, fair, out=np.zeros_like(shown), where=fair > 0.0)
-    while True:
-        wanted = 2 * np.rint(usual * np.clip(share, 1.0, _MOST) / 2.0).astype(np.int64)
-        if float(wanted.mean()) <= (1.0 + _MOST_TOGETHER) * usual:
-            return wanted
-        share = share / _STEP
+    around = _nearby(fit, area, np.ones_like(area))
+    bright = np.maximum(_nearby(fit, area, light), _BLACK * around * float(area @ light) / float(area.sum()))
+    shown = np.divide(_nearby(fit, area, noise), bright, out=np.zeros_like(area), where=bright > 0.0)
+    share = np.sqrt(area * shown)
+    if not share.any():
+        return np.full(len(area), usual)
+    least, most = 1.0 / share.max(), _MOST / share[share > 0.0].min()
+    for _ in range(_BISECTIONS):
+        middle = np.sqrt(least * most)
+        if float(np.clip(middle * share, 1.0, _MOST).mean()) > 1.0 + more:
+            most = middle
+        else:
+            least = middle
+    # Rounded so that the parts that are left over are samples of every so many cells.
+    pairs = np.cumsum(usual / 2.0 * np.clip(least * share, 1.0, _MOST))
+    return 2 * np.diff(np.floor(pairs + 0.5), prepend=0.0).astype(np.int64)
+
+
+def _nearby(fit: Fit, area: Float64, values: Float64) -> Float64:
+    """Sums (c,) of values (c,) times area around each cell."""
+    return np.asarray(fit.at_corners(fit.nearby(area * values)).mean(axis=1))

@@ -74,8 +74,9 @@ _MOST_CROSSED = 0.25
 _TYPICAL_DIRECT = 0.5
 #: Finding that takes so many rounds at most, passes over all cells in each, and rays of each point that look around.
 BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
-#: Up to which asked error noise is hidden where it shows, and how many times as many samples that takes, typically.
-HIDES_NOISE, _HIDING = 0.05, 1.2
+#: Up to which asked error more samples hide the noise of triangles of many sizes, and how many times as many more than
+#: there are anyway.
+HIDES_NOISE, HIDING = 0.05, 1.0
 #: Contours take so many points for each cell.
 _CONTOUR_POINTS = 12
 #: Share of the cells in which the shadow of one lamp ends; error from which on these need many points.
@@ -324,12 +325,12 @@ class _Prices:
         if pieces:
             works["emitting surfaces"] = Work(shadow=per_light * pieces)
         if planned.looks_around:
-            hiding = _HIDING if effort.error <= HIDES_NOISE else 1.0
+            looks = passes * (1.0 + HIDING * (self._settings.tessellate and effort.error <= HIDES_NOISE))
             # One look serves all that it may meet: it counts for the first of them.
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
             look = Work(
                 transport=2 * patches * effort.transport_rays,
-                gather=hiding * cells * passes * effort.gather_rays + surveyed * BEND_RAYS,
+                gather=cells * looks * effort.gather_rays + surveyed * BEND_RAYS,
                 patches=patches,
             )
             works[first] = replace(look, shadow=works[first].shadow) if first in works else look

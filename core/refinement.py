@@ -23,7 +23,7 @@ from .accuracy import (
 from .clock import Clock
 from .noise import samples_wanted
 from .parallel import Workers
-from .plan import HIDES_NOISE, Effort
+from .plan import HIDES_NOISE, HIDING, Effort
 from .receivers import cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
@@ -198,10 +198,12 @@ def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:
 
 
 def hide_noise(survey: Survey, judged: Judged) -> None:
-    """More samples of indirect light where its noise would show; whoever asks for little has it sooner without."""
-    if survey.surroundings and survey.error <= HIDES_NOISE:
+    """More samples of indirect light where its noise would show, as where triangles are large. Those of a mesh that is
+    kept are about as large as each other, and whoever asks for little has it sooner without."""
+    if survey.surroundings and survey.receivers.tessellated and survey.error <= HIDES_NOISE:
         seen = survey.receivers.at_cells(judged.parts[0].grey + judged.parts[1].grey)
-        survey.top_up(samples_wanted(judged.fit, survey.passes, judged.area, judged.parts[1].sampling, seen))
+        noise = judged.parts[1].sampling
+        survey.top_up(samples_wanted(judged.fit, survey.passes, HIDING, judged.area, noise, seen))
 
 
 def fit_samples(survey: Survey, judged: Judged, workers: Workers) -> FittedSurvey:

@@ -44,33 +44,45 @@ def floors(build):
     return Fit(made, np.ones((len(made.cells), 3)), np.zeros(len(made.cells), bool)), made.cells.area, second
 
 
-def test_noise_is_even_where_its_variance_is_in_proportion_to_the_light(floors):
+def test_as_many_more_samples_are_wanted_as_there_are_to_be_had_and_no_cell_has_fewer_or_more_than_16_times(floors):
     fit, area, small = floors
-    light = np.where(small, 0.1, 1.0)
-    assert (samples_wanted(fit, 2, area, 0.01 * light, light) == 2).all()
+    rng = np.random.default_rng(1)
+    light, noise = np.where(small, 1e-2, 1.0), rng.uniform(0.5, 2.0, len(area))
+    for more in (0.5, 1.0, 2.0):
+        wanted = samples_wanted(fit, 2, more, area, noise, light)
+        assert (wanted % 2 == 0).all()
+        assert wanted.mean() == pytest.approx(2.0 * (1.0 + more), rel=0.02)
+        assert wanted.min() >= 2
+        assert wanted.max() <= 32
 
 
-@pytest.mark.parametrize(("darker", "times"), [(8.0, 8), (64.0, 16)])
-def test_a_dark_place_as_noisy_as_a_bright_one_gets_more_samples_as_it_is_darker_but_16_times_at_most(
-    floors, darker, times
-):
-    """What is next to it is no part of it, and has as many as before."""
+def test_samples_go_as_the_root_of_what_shows_and_of_the_area(floors):
+    """The small floor has a sixteenth of the light, with as much noise: a sample there counts as four. Cells a quarter
+    as large as others want half as many."""
     fit, area, small = floors
-    wanted = samples_wanted(fit, 2, area, np.full(len(area), 0.01), np.where(small, 1.0 / darker, 1.0))
-    assert (wanted[small] == 2 * times).all()
-    assert (wanted[~small] == 2).all()
+    noise, light = np.full(len(area), 0.01), np.where(small, 1.0 / 16.0, 1.0)
+    fine = area < 0.5 * np.median(area[~small])
+    wanted = samples_wanted(fit, 100, 0.4, area, noise, light) / np.sqrt(area)
+    assert len(np.unique(fine[~small])) == 1
+    bright = np.median(wanted[~small])
+    assert np.median(wanted[small]) == pytest.approx(4.0 * bright, rel=0.02)
+    assert np.ptp(wanted[~small]) < 0.02 * bright
 
 
-def test_no_more_than_half_as_many_again_are_wanted_in_all(floor, fit):
-    wanted = samples_wanted(
-        fit, 2, floor.cells.area, np.full(len(floor.cells), 0.01), np.where(across(floor) > 0.0, 1e-3, 1.0)
+def test_what_is_all_but_black_is_no_darker_to_the_eye_than_a_thousandth_of_the_light(floors):
+    fit, area, small = floors
+    noise = np.full(len(area), 0.01)
+    mean = area[~small].sum() / area.sum()
+    black, dark = (
+        samples_wanted(fit, 20, 0.5, area, noise, np.where(small, light, 1.0)) for light in (1e-9, 1e-3 * mean)
     )
-    assert 2.2 < wanted.mean() <= 3.0
+    assert np.array_equal(black, dark)
 
 
-def test_in_the_dark_nothing_is_wanted(floor, fit):
-    dark = np.zeros(len(floor.cells))
-    assert (samples_wanted(fit, 2, floor.cells.area, dark, dark) == 2).all()
+def test_where_there_is_no_noise_or_no_light_nothing_more_is_wanted(floor, fit):
+    area, none = floor.cells.area, np.zeros(len(floor.cells))
+    assert (samples_wanted(fit, 2, 1.0, area, none, np.ones(len(area))) == 2).all()
+    assert (samples_wanted(fit, 2, 1.0, area, none + 0.01, none) == 2).all()
 
 
 def noisy(floor, light, more, rng):
@@ -123,13 +135,13 @@ def test_after_more_samples_the_fit_is_as_much_better_and_says_so(floor):
     assert stated == pytest.approx(true, rel=0.15)  # some 400 degrees of freedom each: 3.5 % deviation
 
 
-def test_a_bake_looks_longer_where_its_noise_would_show_but_not_if_little_is_asked(build, monkeypatch):
-    """The sides of the box get no light straight from the lamp."""
+def test_a_bake_looks_longer_where_its_noise_would_show(build, monkeypatch):
+    """Where triangles are large; but not if little is asked, or if a mesh is kept."""
     longer = []
     monkeypatch.setattr(Survey, "top_up", lambda survey, wanted: longer.append((survey, wanted)))
-    for error in (0.05, 0.1):
-        bake(build.furnished_room(), Settings(triangles=3000, error=error))
+    for error, tessellate in ((0.1, True), (0.05, True), (0.05, False)):
+        bake(build.furnished_room(), Settings(triangles=3000, error=error, tessellate=tessellate))
     ((survey, wanted),) = longer
-    dark = survey.direct[0].light.sum(axis=(1, 2)) == 0.0
-    assert wanted.max() > 2
-    assert wanted[dark].mean() > wanted[~dark].mean()
+    area = survey.receivers.cells.area
+    assert wanted.min() == survey.passes
+    assert np.average(wanted, weights=area) > 1.2 * wanted.mean()
