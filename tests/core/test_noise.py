@@ -76,7 +76,7 @@ def test_what_is_all_but_black_is_no_darker_to_the_eye_than_a_thousandth_of_the_
     black, dark = (
         samples_wanted(fit, 20, 0.5, area, noise, np.where(small, light, 1.0)) for light in (1e-9, 1e-3 * mean)
     )
-    assert np.array_equal(black, dark)
+    assert np.abs(black - dark).max() <= 2  # rounded to an even number
 
 
 def test_where_there_is_no_noise_or_no_light_nothing_more_is_wanted(floor, fit):
