@@ -136,8 +136,8 @@ def test_no_light_leaks_through_a_thin_wall(thickness):
         area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)[:, None]
         here, there = ((at > 0.0) & (at < 0.1)) * area, ((at > 0.1 + thickness) & (at < 0.2)) * area
         beyond.append((light * there).sum() / there.sum() / ((light * here).sum() / here.sum()))
-    # A sheet leaks 1.78 +- 0.09 % in the mean of sixteen seeds, which differ by a fifth of that, and a wall of 1 mm less;
-    # the mean of six is off by 0.15 %, and three times that is allowed.
+    # A sheet leaks 1.78 +- 0.09 % in the mean of sixteen seeds, which differ by a fifth of that, and a wall of 1 mm
+    # less. The mean of six is off by 0.15 %; three times that is allowed.
     assert np.mean(beyond) < 0.0225
 
 
