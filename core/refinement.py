@@ -202,7 +202,9 @@ def hide_noise(survey: Survey, judged: Judged) -> None:
     kept are about as large as each other, and whoever asks for little has it sooner without."""
     if survey.surroundings and survey.receivers.tessellated and survey.error <= HIDES_NOISE:
         seen = survey.receivers.at_cells(judged.parts[0].grey + judged.parts[1].grey)
-        noise = judged.parts[1].sampling
+        indirect = judged.parts[1]
+        # Of cells that had more samples before: what as many as usual would leave.
+        noise = indirect.sampling * indirect.tried / survey.passes
         survey.top_up(samples_wanted(judged.fit, survey.passes, HIDING, judged.area, noise, seen))
 
 
