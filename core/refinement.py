@@ -6,7 +6,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
-from time import perf_counter
 
 import numpy as np
 
@@ -77,42 +76,53 @@ def refine(
     show: Callable[[Light], None],
 ) -> Light:
     """Passes until the estimated error, or the clock, says so. show: takes the light after each pass, if watched."""
-    begun, first = perf_counter(), effort.passes - survey.passes % effort.passes
+    seconds = settings.seconds or np.inf
+
+    def fitted(begin: float, error: float | None = None) -> Light:
+        with clock.stage("fit", begin, error):
+            judged, buried = workers.beside(partial(judge_samples, survey, scene, workers), survey.buried)
+        if clock.elapsed < seconds:
+            with clock.stage("gather", begin + 0.02, error):
+                hide_noise(survey, judged)
+        with clock.stage("fit", begin + 0.03, error):
+            return fit_light(survey, judged, buried, workers)
+
+    passes = effort.passes - survey.passes % effort.passes
     with clock.stage("gather", 0.3):
-        for number in range(first):
-            begin, end = (0.3 + 0.4 * n / first for n in (number, number + 1))
-            clock.progress.report("gather", begin, until=end)
-            survey.run_pass()
-            if clock.progress.watched:
-                show(average_light(survey))
-        seconds = settings.seconds or np.inf
+        _run_passes(survey, passes, clock, show)
         if clock.elapsed < seconds:
             survey.refine_boundaries(effort.boundary_passes)
-    seconds_per_pass = (perf_counter() - begun) / first
     tried: list[tuple[int, ErrorEstimate]] = []
     for round_number in range(_MOST_ROUNDS):
-        begun = perf_counter()
-        with clock.stage("fit", 0.75 + 0.05 * round_number):
-            light = fit_light(survey, scene, workers)
-        seconds_to_fit = perf_counter() - begun
+        fits = clock.seconds.get("fit", 0.0)
+        light = fitted(0.75 + 0.05 * round_number)
         if clock.progress.watched:
             show(light)
         if settings.error is None and settings.seconds is None:
             break
         tried.append((survey.passes, light.error))
-        left = seconds - clock.elapsed - seconds_to_fit
-        more = min(passes_wanted(tried, settings.error or 0.0), max(left, 0.0) / seconds_per_pass)
-        more = int(more) // 2 * 2
+        left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
+        more = passes_wanted(tried, settings.error or 0.0)
+        more = int(min(more, max(left, 0.0) * passes / clock.seconds["gather"])) // 2 * 2
         if more < 2:
             break
+        passes += more
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
             for _ in range(more):
                 survey.run_pass()
             survey.refine_boundaries(more)
     else:
-        with clock.stage("fit", 0.95, light.error.total):
-            light = fit_light(survey, scene, workers)
+        light = fitted(0.95, light.error.total)
     return light
+
+
+def _run_passes(survey: Survey, passes: int, clock: Clock, show: Callable[[Light], None]) -> None:
+    for number in range(passes):
+        begin, end = (0.3 + 0.4 * n / passes for n in (number, number + 1))
+        clock.progress.report("gather", begin, until=end)
+        survey.run_pass()
+        if clock.progress.watched:
+            show(average_light(survey))
 
 
 def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
@@ -136,10 +146,9 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
     return max(2 * ceil(passes * (min(wanted, _MOST_GROWTH) - 1.0) / 2.0), 0)
 
 
-def fit_light(survey: Survey, scene: Scene, workers: Workers) -> Light:
-    """Least squares onto the vertices, for direct and indirect light each with the smoothing it needs."""
-    judged, buried = workers.beside(partial(judge_samples, survey, scene, workers), survey.buried)
-    hide_noise(survey, judged)
+def fit_light(survey: Survey, judged: Judged, buried: Bool, workers: Workers) -> Light:
+    """Least squares onto the vertices, for direct and indirect light each as smooth as it was judged, and its error.
+    buried (e,): output triangles inside solids."""
     found = fit_samples(survey, judged, workers)
     transport = _squared_transport_error(survey, found.fits)
     error, cell_error = estimate_error(

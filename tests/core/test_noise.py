@@ -145,3 +145,12 @@ def test_a_bake_looks_longer_where_its_noise_would_show(build, monkeypatch):
     area = survey.receivers.cells.area
     assert wanted.min() == survey.passes
     assert np.average(wanted, weights=area) > 1.2 * wanted.mean()
+
+
+def test_once_the_time_is_up_nobody_looks_longer(build, monkeypatch):
+    longer = []
+    monkeypatch.setattr(Survey, "top_up", lambda survey, _: longer.append(survey.passes))
+    for seconds, looked in ((60.0, True), (0.01, False)):
+        longer.clear()
+        bake(build.furnished_room(), Settings(triangles=3000, error=0.05, seconds=seconds))
+        assert bool(longer) == looked
