@@ -26,11 +26,12 @@ from .scene import Float64
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A fit: alpha (v,); vertex values (v, k) of all samples together, and their mean light (v,); squared error of each
-    cell (c,) by sampling and by resolution, of the mean light; the mean light of the halves; how many samples of each
-    cell (c,) told so."""
+    """A fit: alpha (v,); the limits (v, k) of its values; vertex values (v, k) of all samples together, and their mean
+    light (v,); squared error of each cell (c,) by sampling and by resolution, of the mean light; the mean light of the
+    halves; how many samples of each cell (c,) told so."""
 
     alpha: Float64
+    limits: tuple[Float64, Float64]
     values: Float64
     grey: Float64
     sampling: Float64
@@ -90,27 +91,23 @@ def fit_halves(
 ) -> Fitted:
     """Fit with the alpha that `cross_validate` has found, in all channels. Of some cells there may be more samples
     since. loose, each: as there."""
-    limits, together = fit.limits(*halves), fit.system(*halves)
     if (_tried(halves) > judged.tried).any():
-        judged = _with_more_samples(fit, halves, judged, limits, loose, each)
+        judged = _with_more_samples(fit, halves, judged, loose, each)
+    limits, together = judged.limits, fit.system(*halves)
     start = _in_colour(judged.grey, fit.averages(together), halves[0].to_grey)
     light = fit.solve_within(together, judged.alpha, limits, start, loose, each)
     return replace(judged, values=light, grey=light @ halves[0].to_grey)
 
 
 def _with_more_samples(
-    fit: Fit,
-    halves: list[Samples],
-    judged: Fitted,
-    limits: tuple[Float64, Float64],
-    loose: float,
-    each: Callable[..., Any],
+    fit: Fit, halves: list[Samples], judged: Fitted, loose: float, each: Callable[..., Any]
 ) -> Fitted:
     """What is judged, and the mean light of the halves, once some cells have more samples.
 
     Whoever takes the light for a random function weighs its jumps by the variance of a sample over that of a jump
-    (Wahba 1978), so alpha falls as the number of samples grows.
+    (Wahba 1978), so alpha falls as the number of samples grows. What smoothing took before still counts as resolution.
     """
+    limits = fit.limits(*halves)
     before, now = (fit.receivers.vertex_means(tried) for tried in (judged.tried, _tried(halves)))
     fewer = np.divide(before, now, out=np.ones_like(now), where=now > 0.0)
     alpha = np.maximum(judged.alpha * fewer, np.minimum(judged.alpha, ALPHAS[0]))
@@ -118,7 +115,8 @@ def _with_more_samples(
     start = judged.halves.first[:, None], judged.halves.second[:, None]
     values = each(fit.solve, systems, repeat(alpha), start, repeat(_ROUGH * loose))
     fitted = _Halves(*_shown(values, limits, alpha, halves[0].to_grey))
-    return replace(judged, alpha=alpha, halves=fitted, grey=fitted.mean, sampling=fitted.spread(fit) / 4.0)
+    sampling = fitted.spread(fit) / 4.0
+    return replace(judged, alpha=alpha, limits=limits, halves=fitted, grey=fitted.mean, sampling=sampling)
 
 
 def _shown(
@@ -182,7 +180,9 @@ def cross_validate(
         sampling += share * smoothed.spread(fit) / 4.0
         unseen += share * smoothed.smoothed_by(sharpest, fit)
     last = _Halves(best[0][:, 0], best[1][:, 0])
-    return Fitted(np.array(ALPHAS)[level], last.mean[:, None], last.mean, sampling, unseen, last, _tried(halves))
+    return Fitted(
+        np.array(ALPHAS)[level], limits, last.mean[:, None], last.mean, sampling, unseen, last, _tried(halves)
+    )
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:

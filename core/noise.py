@@ -17,20 +17,20 @@ from .tessellation import Int64
 _MOST = 16.0
 #: What gets less than this share of the mean light is no darker to the eye.
 _BLACK = 1e-3
-#: How often the number of samples is halved in on: from a factor of a million to one of 1.01.
-_BISECTIONS = 11
+#: How often the number of samples is halved in on: even from a factor of 1e20 to one of 1.0001.
+_BISECTIONS = 20
 
 
 def samples_wanted(fit: Fit, usual: int, more: float, area: Float64, noise: Float64, light: Float64) -> Int64:
     """How many samples (c,), an even number, each cell should have where the usual number leaves some noise, if there
     are so many times as many as usual more to be had in all.
 
-    Noise shows least in all where the number of samples goes as the root of the variance that each stands for (Neyman
-    1934): a large triangle needs more than a small one. area (c,) of the cells; noise (c,): squared error of the fitted
-    light; light (c,): how bright it is.
+    Noise shows least in all where the number of samples goes as the root of area times noise over light (Neyman 1934):
+    a large triangle needs more than a small one. area (c,) of the cells, as far as they are in sight; noise (c,):
+    squared error of the fitted irradiance; light (c,): the irradiance. What colour a surface has is left aside.
     """
     around = _nearby(fit, area, np.ones_like(area))
-    bright = np.maximum(_nearby(fit, area, light), _BLACK * around * float(area @ light) / float(area.sum()))
+    bright = np.maximum(_nearby(fit, area, light), _BLACK * around * float(area @ light) / (float(area.sum()) or 1.0))
     shown = np.divide(_nearby(fit, area, noise), bright, out=np.zeros_like(area), where=bright > 0.0)
     share = np.sqrt(area * shown)
     if not share.any():

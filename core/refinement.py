@@ -81,9 +81,11 @@ def refine(
     def fitted(begin: float, error: float | None = None) -> Light:
         with clock.stage("fit", begin, error):
             judged, buried = workers.beside(partial(judge_samples, survey, scene, workers), survey.buried)
-        if clock.elapsed < seconds:
+        left = seconds - clock.elapsed - clock.seconds["fit"]
+        more = more_samples(survey, left / clock.seconds["gather"])
+        if more > 0.0:
             with clock.stage("gather", begin + 0.02, error):
-                hide_noise(survey, judged)
+                hide_noise(survey, judged, more)
         with clock.stage("fit", begin + 0.03, error):
             return fit_light(survey, judged, buried, workers)
 
@@ -206,15 +208,24 @@ def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:
     return Judged(fit, list(workers.each(judged, survey.sampled)), colours, area, loose)
 
 
-def hide_noise(survey: Survey, judged: Judged) -> None:
-    """More samples of indirect light where its noise would show, as where triangles are large. Those of a mesh that is
-    kept are about as large as each other, and whoever asks for little has it sooner without."""
-    if survey.surroundings and survey.receivers.tessellated and survey.error <= HIDES_NOISE:
-        seen = survey.receivers.at_cells(judged.parts[0].grey + judged.parts[1].grey)
-        indirect = judged.parts[1]
-        # Of cells that had more samples before: what as many as usual would leave.
-        noise = indirect.sampling * indirect.tried / survey.passes
-        survey.top_up(samples_wanted(judged.fit, survey.passes, HIDING, judged.area, noise, seen))
+def more_samples(survey: Survey, time: float) -> float:
+    """How many times as many samples of indirect light as before there are to be had to hide noise, if all of them take
+    no longer than `time` times as long as those before.
+
+    Triangles of a mesh that is kept are about as large as each other and need none, and whoever asks for little has it
+    sooner without.
+    """
+    needed = survey.surroundings and survey.receivers.tessellated and survey.error <= HIDES_NOISE
+    return HIDING * float(np.clip(time, 0.0, 1.0)) if needed else 0.0
+
+
+def hide_noise(survey: Survey, judged: Judged, more: float) -> None:
+    """More samples of indirect light, so many times as many as before, where its noise would show."""
+    seen = survey.receivers.at_cells(judged.parts[0].grey + judged.parts[1].grey)
+    indirect = judged.parts[1]
+    # Of cells that had more samples before: what as many as usual would leave.
+    noise = indirect.sampling * indirect.tried / survey.passes
+    survey.top_up(samples_wanted(judged.fit, survey.passes, more, judged.area, noise, seen))
 
 
 def fit_samples(survey: Survey, judged: Judged, workers: Workers) -> FittedSurvey:

@@ -143,6 +143,16 @@ def out_of_sight(
     return np.asarray(hidden)
 
 
+def doubted(points: Points, around: Surroundings, enclosed: Bool, arriving: Float64, mean: float) -> Bool:
+    """Points (n,) that are out of sight if they get nothing straight from the sources; see `out_of_sight`. arriving
+    (n,): all other irradiance."""
+    doubtful = enclosed.copy()
+    dim = np.flatnonzero(~enclosed & (arriving <= _DIM * mean))
+    if len(dim):
+        doubtful[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], GAP * points.size[dim])
+    return doubtful
+
+
 def dark(total: Float64, direct: Float64, mean: float) -> Bool:
     """Points (n,) that get next to nothing of the mean light, and nothing straight from the sources."""
     return np.asarray((total <= _DARK * mean) & (direct <= 0))

@@ -21,7 +21,7 @@ from .receivers import Receivers
 from .reconstruction import Samples
 from .sampling import stream
 from .scene import Bool, Float64
-from .surroundings import Surroundings, dark, out_of_sight
+from .surroundings import Surroundings, dark, doubted, out_of_sight
 from .visibility import Visibility
 
 #: Samples that are added at a time, and points beside shadow boundaries that are looked at together: many calls for few
@@ -79,7 +79,8 @@ class Survey:
         self.workers = workers
         self._shift = stream(seed, "cells").random((count, 2))
         self.signatures: list[NDArray[np.int64]] = []
-        self._extra = 0
+        #: How often there were more points for direct light, and for indirect light.
+        self._extra, self._longer = 0, 0
         self.mean = 0.0
         #: The cells that were not recalled, and how many passes are for them alone.
         self._fresh, self._recalled = np.arange(count), 0
@@ -242,28 +243,38 @@ class Survey:
         (c,)."""
         had = self.indirect[0].tried + self.indirect[1].tried
         lacking = np.where(self.invalid, 0, np.maximum(wanted - had, 0)) // 2
-        if self.surroundings is not None and lacking.any():
+        while self.surroundings is not None and lacking.any():
+            chosen = np.flatnonzero(lacking)
+            samples = np.minimum(lacking[chosen], max(_BESIDE // len(chosen), 1))
             for half in range(2):
-                self._top_up(self.surroundings, half, lacking)
+                self._look_longer(self.surroundings, half, chosen, samples)
+            lacking[chosen] -= samples
 
-    def _top_up(self, around: Surroundings, half: int, samples: NDArray[np.int64]) -> None:
-        """So many more samples (c,) of the cells for one half of the indirect light."""
-        chosen = np.repeat(np.arange(len(samples)), samples)
+    def _look_longer(
+        self, around: Surroundings, half: int, cells: NDArray[np.int64], samples: NDArray[np.int64]
+    ) -> None:
+        """So many more samples (n,) of some cells (n,) for one half of the indirect light."""
+        chosen = np.repeat(cells, samples)
         turn = np.arange(len(chosen)) - np.repeat(np.cumsum(samples) - samples, samples)
-        number = 5_000_000 + int(self.indirect[half].tried.max())
-        points = Points.of_pass(self.receivers.cells, chosen, self.passes + 2 * turn + half, self._shift)
+        # The sequence of points goes on before its beginning: those of the passes to come are further on.
+        earlier = self.indirect[half].tried[chosen] - self.passes // 2 + turn
+        points = Points.of_pass(self.receivers.cells, chosen, -1 - 2 * earlier - half, self._shift)
+        number = 5_000_000 + self._longer
+        self._longer += 1
         table = around.tables[half][:, : len(around.to_grey)]
         looks = points, around.hemispheres, table, self.seed, number, self.workers
         values, deviation, enclosed, rays = gather_indirect(*looks)
         self.rays += rays
-        # Where one sample of a cell is lit and another buried, their mean tells nothing of this one.
+        arriving = values @ around.to_grey
+        # Where one sample of a cell is lit and another hidden, their mean tells nothing of this one.
         direct = (self.direct[0].grey() + self.direct[1].grey()).mean_grey[chosen]
-        doubtful = np.flatnonzero(enclosed & (direct > 0.0))
+        lit = np.flatnonzero(direct > 0.0)
+        doubtful = lit[doubted(points.only(lit), around, enclosed[lit], arriving[lit], self.mean)]
         if len(doubtful):
             direct[doubtful] = self._direct(points.only(doubtful), number).grey
-        valid = self._in_sight(around, number, points, values @ around.to_grey + direct, direct, enclosed)
+        valid = self._in_sight(around, number, points, arriving + direct, direct, enclosed)
         noise = (deviation @ around.to_grey) ** 2
-        for one in range(int(turn.max()) + 1):
+        for one in range(int(samples.max())):
             now = np.flatnonzero(turn == one)
             self._add(self.indirect[half], chosen[now], points.only(now), values[now], noise[now], valid[now])
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from radiosity_baker.core import survey as core_survey
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.keys import same_cells
@@ -106,14 +107,16 @@ def looked_around(build, workers):
     return made
 
 
-def test_some_cells_are_looked_at_longer(looked_around):
+def test_some_cells_are_looked_at_longer(looked_around, monkeypatch):
     """Those have as many samples of indirect light as they should, in two halves that are alike, and the others what
     they had; a mean of sixteen times as many is four times as near."""
     survey = looked_around
     cells = len(survey.receivers.cells)
     chosen = np.arange(cells) % 2 == 0
     before = [half.mean_grey for half in survey.indirect]
-    rays = survey.rays["gather"]
+    rays, numbers = survey.rays["gather"], []
+    gather = core_survey.gather_indirect
+    monkeypatch.setattr(core_survey, "gather_indirect", lambda *looks: numbers.append(looks[4]) or gather(*looks))
     survey.top_up(np.where(chosen, 32, 2))
     longer = chosen & ~survey.invalid
     for half in survey.indirect:
@@ -128,5 +131,6 @@ def test_some_cells_are_looked_at_longer(looked_around):
     assert np.array_equal(after[0][~longer], before[0][~longer])
     apart = [np.std((one - other)[longer]) for one, other in (before, after)]
     assert 2.5 < apart[0] / apart[1] < 6.0
+    assert len(numbers) == len(set(numbers)) >= 2, "so that the halves have random numbers of their own"
     survey.top_up(np.where(chosen, 32, 2))
     assert np.array_equal(after[0], survey.indirect[0].mean_grey)
