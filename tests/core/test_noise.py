@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -9,8 +11,10 @@ from radiosity_baker.core.accuracy import ALPHAS, cross_validate, fit_halves, sq
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.noise import samples_wanted
 from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.plan import HIDING
 from radiosity_baker.core.receivers import make_receivers
 from radiosity_baker.core.reconstruction import Fit, Samples
+from radiosity_baker.core.refinement import more_samples
 from radiosity_baker.core.scene import Scene
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.survey import Survey
@@ -153,3 +157,9 @@ def test_once_the_time_is_up_nobody_looks_longer(build, monkeypatch):
         longer.clear()
         bake(build.furnished_room(), Settings(triangles=3000, error=0.05, seconds=seconds))
         assert bool(longer) == looked
+
+
+@pytest.mark.parametrize(("time", "more"), [(np.inf, 1.0), (0.25, 0.25), (-1.0, 0.0)])
+def test_no_more_samples_are_taken_than_there_is_time_for(time, more):
+    survey = SimpleNamespace(surroundings=object(), receivers=SimpleNamespace(tessellated=True), error=0.02)
+    assert more_samples(survey, time) == more * HIDING
