@@ -76,7 +76,7 @@ _TYPICAL_DIRECT = 0.5
 BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
 #: Up to which asked error more samples hide the noise of triangles of many sizes, and how many times as many more than
 #: there are anyway.
-HIDES_NOISE, HIDING = 0.05, 1.0
+_HIDES_NOISE, HIDING = 0.05, 1.0
 #: Contours take so many points for each cell.
 _CONTOUR_POINTS = 12
 #: Share of the cells in which the shadow of one lamp ends; error from which on these need many points.
@@ -325,7 +325,7 @@ class _Prices:
         if pieces:
             works["emitting surfaces"] = Work(shadow=per_light * pieces)
         if planned.looks_around:
-            looks = passes * (1.0 + HIDING * (self._settings.tessellate and effort.error <= HIDES_NOISE))
+            looks = passes * (1.0 + hiding(self._settings.tessellate, effort.error))
             # One look serves all that it may meet: it counts for the first of them.
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
             look = Work(
@@ -391,6 +391,15 @@ def _sampled(triangles: int, error: float) -> int:
     """On how many cells light is sampled where triangles are kept, if these are not as many already: they show no
     more."""
     return max(int(triangles * min(0.02 / error, 1.0)), min(triangles, _FEWEST))
+
+
+def hiding(tessellated: bool, error: float) -> float:
+    """How many times as many samples of indirect light as there are anyway hide noise.
+
+    Triangles of a mesh that is kept are about as large as each other and need none, and whoever asks for little has it
+    sooner without.
+    """
+    return HIDING if tessellated and error <= _HIDES_NOISE else 0.0
 
 
 def gather_rays(error: float, cells: int = 0) -> int:

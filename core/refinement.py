@@ -22,7 +22,7 @@ from .accuracy import (
 from .clock import Clock
 from .noise import samples_wanted
 from .parallel import Workers
-from .plan import HIDES_NOISE, HIDING, Effort
+from .plan import Effort, hiding
 from .receivers import cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
@@ -210,13 +210,10 @@ def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:
 
 def more_samples(survey: Survey, time: float) -> float:
     """How many times as many samples of indirect light as before there are to be had to hide noise, if all of them take
-    no longer than `time` times as long as those before.
-
-    Triangles of a mesh that is kept are about as large as each other and need none, and whoever asks for little has it
-    sooner without.
-    """
-    needed = survey.surroundings and survey.receivers.tessellated and survey.error <= HIDES_NOISE
-    return HIDING * float(np.clip(time, 0.0, 1.0)) if needed else 0.0
+    no longer than `time` times as long as those before."""
+    if survey.surroundings is None:
+        return 0.0
+    return hiding(survey.receivers.tessellated, survey.error) * float(np.clip(time, 0.0, 1.0))
 
 
 def hide_noise(survey: Survey, judged: Judged, more: float) -> None:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .gather import Points, gather_indirect
 from .hemisphere import Hemispheres
@@ -139,7 +140,7 @@ def out_of_sight(
         hidden[doubtful] = look(points.only(doubtful)) <= _LIT * mean
     dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
     if len(dim):
-        hidden[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], GAP * points.size[dim])
+        hidden[dim] = _in_gap(points, around, dim)
     return np.asarray(hidden)
 
 
@@ -149,8 +150,14 @@ def doubted(points: Points, around: Surroundings, enclosed: Bool, arriving: Floa
     doubtful = enclosed.copy()
     dim = np.flatnonzero(~enclosed & (arriving <= _DIM * mean))
     if len(dim):
-        doubtful[dim] = around.hemispheres.covered(points.positions[dim], points.normals[dim], GAP * points.size[dim])
+        doubtful[dim] = _in_gap(points, around, dim)
     return doubtful
+
+
+def _in_gap(points: Points, around: Surroundings, some: NDArray[np.int64]) -> Bool:
+    """Whether something lies so near above some of the points (n,) that their cell is too large for the gap."""
+    reach = GAP * points.size[some]
+    return around.hemispheres.covered(points.positions[some], points.normals[some], reach)
 
 
 def dark(total: Float64, direct: Float64, mean: float) -> Bool:

@@ -243,18 +243,27 @@ class Survey:
         (c,)."""
         had = self.indirect[0].tried + self.indirect[1].tried
         lacking = np.where(self.invalid, 0, np.maximum(wanted - had, 0)) // 2
-        while self.surroundings is not None and lacking.any():
+        if self.surroundings is None or not lacking.any():
+            return
+        direct = (self.direct[0].grey() + self.direct[1].grey()).mean_grey
+        while lacking.any():
             chosen = np.flatnonzero(lacking)
             samples = np.minimum(lacking[chosen], max(_BESIDE // len(chosen), 1))
             for half in range(2):
-                self._look_longer(self.surroundings, half, chosen, samples)
+                self._look_longer(self.surroundings, half, chosen, samples, direct[chosen])
             lacking[chosen] -= samples
 
     def _look_longer(
-        self, around: Surroundings, half: int, cells: NDArray[np.int64], samples: NDArray[np.int64]
+        self,
+        around: Surroundings,
+        half: int,
+        cells: NDArray[np.int64],
+        samples: NDArray[np.int64],
+        straight: Float64,
     ) -> None:
-        """So many more samples (n,) of some cells (n,) for one half of the indirect light."""
-        chosen = np.repeat(cells, samples)
+        """So many more samples (n,) of some cells (n,) for one half of the indirect light. straight (n,): what they get
+        straight from the sources, in the mean."""
+        chosen, direct = np.repeat(cells, samples), np.repeat(straight, samples)
         turn = np.arange(len(chosen)) - np.repeat(np.cumsum(samples) - samples, samples)
         # The sequence of points goes on before its beginning: those of the passes to come are further on.
         earlier = self.indirect[half].tried[chosen] - self.passes // 2 + turn
@@ -267,7 +276,6 @@ class Survey:
         self.rays += rays
         arriving = values @ around.to_grey
         # Where one sample of a cell is lit and another hidden, their mean tells nothing of this one.
-        direct = (self.direct[0].grey() + self.direct[1].grey()).mean_grey[chosen]
         lit = np.flatnonzero(direct > 0.0)
         doubtful = lit[doubted(points.only(lit), around, enclosed[lit], arriving[lit], self.mean)]
         if len(doubtful):
