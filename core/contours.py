@@ -6,13 +6,15 @@ with values of its own on either side, the light is linear again, whatever the s
 light with size is cut twice, where it begins and where it is full: between the two is a strip of triangles.
 
 Neighbouring cells that have other lights in view are where contours are looked for, and from there they are followed
-from edge to edge. On an edge, bisection finds the place. A shadow that is soft over much of an edge is left alone, for
-triangles of this size show it.
+from edge to edge. On an edge, bisection finds the place. Of many lights whose shadows cross an edge the one that steps
+most is cut along first, and the pieces are looked at again. A contour is left alone where a line from end to end of
+the edge shows the light about as well: a shadow that is soft over all of the edge.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 
@@ -40,17 +42,17 @@ _NARROWINGS, _BETWEEN, _PASSES = 4, 3, 4
 _SNAP = 0.015
 #: How far within what is covered a cut is put, relative to that: a little of its dark would show.
 _WITHIN = 0.5
-#: A shadow is sharp when light changes by this share of its whole change within so much of the edge to either side; it
-#: counts when that is this share of the light.
-_SHARP, _BESIDE, _CONTRAST = 0.7, 0.25, 0.1
-#: Standard deviations of the noise that a change of light must exceed.
-_SIGNIFICANT = 4.0
+#: A shadow counts when light along the edge, and so near to the contour, is off a line from end to end by so much, as a
+#: share of how far light changes there, and of the light.
+_NEAR, _KINK, _CONTRAST = 0.02, 0.1, 0.1
+#: How far beside what stands on a surface light is looked at, relative to the edge.
+_BESIDE = 0.25
 #: What stands on a surface, however thin, counts when light differs by this share on its two sides.
 _PARTED = 0.5
 #: How far beside a side of a cell, relative to its height, it shows what is on either side.
 _BESIDE_SIDE = 0.1
 #: Rays that tell how much light there is, and whether a point is inside a solid.
-_SHADOW_RAYS, _RAYS = 8, 16
+_SHADOW_RAYS, _RAYS = 16, 16
 #: The ends of a way along a surface are left out, lest it meets what bounds the surface.
 _BARRED_UP_TO = 0.98
 #: Points in a chunk; a number of streams that nothing else uses.
@@ -111,7 +113,7 @@ class _Look:
 class _Crossings:
     """Of edges (e,): a place from the first end to the second where a contour that matters crosses each, nan where none
     does; where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side; and
-    by how much irradiance differs on the two sides.
+    by how much irradiance a line from end to end would be wrong.
     """
 
     place: Float64
@@ -174,7 +176,7 @@ class Contours:
 
     def cut(self, receivers: Receivers, least: float = 0.0) -> tuple[Receivers, Int64]:
         """The receivers with cells cut along the contours; and for each new cell the one it came from. least: a shadow
-        is left alone where its step, squared, in radiance, times the area of the cell that it crosses is less.
+        is left alone where what a line would miss, squared, in radiance, times the area of the cell is less.
         """
         source = np.arange(len(receivers.cells))
         if self._nothing_to_find:
@@ -238,44 +240,77 @@ class Contours:
         found[known] = recalled
         fresh = np.flatnonzero(~known)
         if len(fresh):
-            some, place, inward = self._crossings(receivers, edges.only(fresh))
-            step, contact = self._matter(receivers, edges.only(fresh[some]), place)
-            matters = step > 0.0
-            found[fresh[some][matters]] = _Crossings(place, contact * inward, step)[matters]
+            found[fresh] = self._crossings(receivers, edges.only(fresh))
             self._known.remember(edges.key[fresh], found[fresh])
         return found
 
-    def _crossings(self, receivers: Receivers, edges: _Edges) -> tuple[Int64, Float64, Int64]:
-        """Edges (n,) along which what is in sight changes, a place (n,) of each where it does, and where from
-        there (n,) what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side."""
+    def _crossings(self, receivers: Receivers, edges: _Edges) -> _Crossings:
+        """The same where nothing is known yet: outlines of what stands on the surface first, and shadows on edges that
+        none crosses."""
         seen = self._on_edges(receivers, edges, np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(edges.cell))))
+        found = _Crossings.none(len(edges.cell))
+
+        def cross(
+            bits: Int64, step: Int64, matter: Callable[[Receivers, _Edges, Float64], tuple[Float64, Bool]]
+        ) -> None:
+            some = np.flatnonzero((bits > 0) & ~np.isfinite(found.place))
+            if len(some):
+                each, there = edges.only(some), (step[some], some)
+                before = seen[there]
+                place = self._place(receivers, each, before, seen[step[some] + 1, some], step[some], bits[some])
+                inward = np.where(bits[some] < _COVERED, 0, np.where(before >= _COVERED, -1, 1))
+                missed, outline = matter(receivers, each, place)
+                matters = missed > 0.0
+                found[some[matters]] = _Crossings(place, outline * inward, missed)[matters]
+
         changes = seen[1:] ^ seen[:-1]
-        crossed = np.flatnonzero(changes.any(axis=0))
-        # Where something is covered, that is all that counts.
-        outline = changes[:, crossed] >= _COVERED
-        counts = np.where(outline.any(axis=0), _COVERED, -1)
-        step = ((changes[:, crossed] & counts) != 0).argmax(axis=0)
-        low, width = _PLACES[step], np.diff(_PLACES)[step]
-        before, after = seen[step, crossed], seen[step + 1, crossed]
-        # From here on only what differs is looked at: of many lights that are mostly one.
-        differs = changes[step, crossed] & counts
-        edges, each = edges.only(crossed), np.arange(len(crossed))
+        # Where something is covered nothing else counts.
+        bits = np.where((changes >= _COVERED).any(axis=0), _COVERED, _BARRED)
+        differs = (changes & bits) != 0
+        cross(bits * differs.any(axis=0), differs.argmax(axis=0), self._stands)
+        cross(*self._strongest(receivers, edges, seen), self._kinks)
+        return found
+
+    def _strongest(self, receivers: Receivers, edges: _Edges, seen: Int64) -> tuple[Int64, Int64]:
+        """Of the lights of which so much is seen (p, e) at the places of the edges, the bits (e,) of that whose shadow
+        makes the largest step between two of them, 0 where none does, and where (e,) it does."""
+        middles = Points(receivers.cells, edges.cell, edges.weights(np.full(len(edges.cell), 0.5)))
+        bits, place = np.zeros((2, len(edges.cell)), dtype=np.int64)
+        largest = np.zeros(len(bits))
+        for number, light in enumerate(self._light.lights if self._lights else []):
+            hidden = (seen >> number & 1) + (seen >> _WHOLE + number & 1)
+            change = np.abs(np.diff(hidden, axis=0))
+            most = change.max(axis=0)
+            step = most * light.share(middles.positions, middles.shading) * light.color.mean()
+            more = step > largest
+            bits[more], largest[more], place[more] = _bits_of(number), step[more], change.argmax(axis=0)[more]
+        return bits, place
+
+    def _place(
+        self, receivers: Receivers, edges: _Edges, before: Int64, after: Int64, step: Int64, bits: Int64
+    ) -> Float64:
+        """Where (e,) on each edge something of the bits (e,) first differs from what is seen (e,) before that step
+        (e,) from place to place, as it does after (e,) it."""
+        low, width = _PLACES[step], (_PLACES[1:] - _PLACES[:-1])[step]
+        differs, each = (before ^ after) & bits, np.arange(len(step))
         for _ in range(_NARROWINGS):
             width = width / (_BETWEEN + 1)
             between = self._on_edges(receivers, edges, low + np.arange(1, _BETWEEN + 1)[:, None] * width, differs)
             between = np.concatenate([between, after[None]])
             first = (((between ^ before) & differs) != 0).argmax(axis=0)
             low, after = low + first * width, between[first, each]
-        inward = np.where(differs >= _COVERED, np.where(before >= _COVERED, -1, 1), 0)
-        return crossed, low + width / 2.0, inward
+        return np.asarray(low + width / 2.0)
 
-    def _on_edges(self, receivers: Receivers, edges: _Edges, places: Float64, differs: Int64 | None = None) -> Int64:
-        """What is in sight (p, e) at places (p, e) of the edges; of the lights only those that differ (e,)."""
+    def _on_edges(self, receivers: Receivers, edges: _Edges, places: Float64, asked: Int64 | None = None) -> Int64:
+        """What is in sight (p, e) at places (p, e) of the edges; only what the bits (e,) ask for, if given."""
         every = edges.only(np.tile(np.arange(len(edges.cell)), len(places)))
-        start = Points(receivers.cells, every.cell, every.weights(np.full(places.size, _PLACES[0])))
         points = Points(receivers.cells, every.cell, every.weights(places.ravel()))
-        asked = None if differs is None else np.tile(differs | differs >> _WHOLE, len(places))
-        sight = self._sight(points, GAP * every.length, asked) + _BARRED * self._barred(start, points.positions)
+        solids = asked is None or bool((asked >= _BARRED).any())
+        lights = None if asked is None else np.tile(asked | asked >> _WHOLE, len(places))
+        sight = self._sight(points, GAP * every.length if solids else None, lights)
+        if solids:
+            start = Points(receivers.cells, every.cell, every.weights(np.full(places.size, _PLACES[0])))
+            sight = sight + _BARRED * self._barred(start, points.positions)
         return sight.reshape(places.shape)
 
     def _barred(self, points: Points, targets: Float64) -> Bool:
@@ -307,31 +342,36 @@ class Contours:
         self.rays += sum((rays for _, rays in found), Counter())
         return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
 
-    def _matter(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
-        """How far light steps on the crossed edges (e,) where a sharp shadow or the outline of what hides one side
-        crosses them, 0 where neither does; and where it is an outline."""
-        if not len(place):
-            return np.zeros(0), np.zeros(0, dtype=bool)
-        ends = np.broadcast_to(_PLACES[[0, -1], None], (2, len(place)))
-        beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), *ends)
-        every = edges.only(np.tile(np.arange(len(place)), 4))
-        where = every.weights(np.concatenate([beside, ends]).ravel())
-        points = Points(receivers.cells, every.cell, where)
-        sides = 2 * len(place)
-        beside_contour = Points(receivers.cells, every.cell[:sides], where[:sides])
+    def _kinks(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
+        """By how much a line from end to end would miss the light on edges (e,) that a shadow crosses, 0 where that is
+        little; and that it is no outline."""
+        beside = np.clip(np.stack([place - _NEAR, place + _NEAR]), _PLACES[0], _PLACES[-1])
+        places = np.concatenate([np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(place))), beside])
+        every = edges.only(np.tile(np.arange(len(place)), len(places)))
+        points = Points(receivers.cells, every.cell, every.weights(places.ravel()))
+        found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
+        self.rays += found.rays
+        light = found.grey.reshape(places.shape)
+        # Not how steep it is: in a strip that is cut where a soft shadow begins that is even, up to where it is full.
+        missed = _off_the_line(light, places)
+        matters = (missed > _KINK * np.ptp(light, axis=0)) & (missed > _CONTRAST * light.max(axis=0))
+        return np.where(matters, missed, 0.0), np.zeros(len(place), dtype=bool)
+
+    def _stands(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
+        """By how much light differs on the two sides of what stands on edges (e,), 0 where that is little, and all of
+        it next to the outline of what hides one side; and where there is such an outline."""
+        beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), _PLACES[0], _PLACES[-1])
+        every = edges.only(np.tile(np.arange(len(place)), 2))
+        points = Points(receivers.cells, every.cell, every.weights(beside.ravel()))
         found, look = self._workers.beside(
-            partial(gather_direct, points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers),
-            partial(self._look, beside_contour, GAP * every.length[:sides], 0),
+            partial(gather_direct, points, self._light, _SHADOW_RAYS, self._seed, _STREAM + 1, self._workers),
+            partial(self._look, points, GAP * every.length, 0),
         )
         self.rays += found.rays + look.rays
-        light, noise = found.grey.reshape(4, -1), np.sqrt(found.variance).mean(axis=1).reshape(4, -1)
-        step = np.abs(light[0] - light[1])
-        sharp = (step > _SHARP * np.abs(light[2] - light[3])) & (step > _CONTRAST * np.maximum(light[0], light[1]))
-        sharp &= step > _SIGNIFICANT * np.hypot(noise[0], noise[1])
-        one, other = light[:2] + look.light
-        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) : sides])
+        one, other = found.grey.reshape(2, -1) + look.light
+        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) :])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
-        step = np.where(sharp | parted, np.maximum(step, np.abs(one - other)), 0.0)
+        step = np.where(parted, np.abs(one - other), 0.0)
         # What is hidden says nothing, so next to it all of the light may be wrong.
         return np.where(look.outlines, np.maximum(np.maximum(one, other), np.finfo(float).tiny), step), look.outlines
 
@@ -388,6 +428,18 @@ def _part(one: Int64, other: Int64) -> Bool:
     """Whether a light is in sight as a whole on one side and hidden on the other, or one of them is covered: (n,)."""
     lights = (1 << _WHOLE) - 1
     return np.asarray(((one >> _WHOLE & ~other | other >> _WHOLE & ~one) & lights | (one ^ other) & _COVERED) > 0)
+
+
+def _bits_of(light: int) -> int:
+    """That some of a light is hidden, and that all of it is."""
+    return 1 << light | 1 << _WHOLE + light
+
+
+def _off_the_line(light: Float64, places: Float64) -> Float64:
+    """How far (e,) the light (p, e) at places, those of _PLACES first, is at most from a line from end to end."""
+    along = (places - _PLACES[0]) / (_PLACES[-1] - _PLACES[0])
+    line = (1.0 - along) * light[0] + along * light[len(_PLACES) - 1]
+    return np.asarray(np.abs(light - line).max(axis=0))
 
 
 def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:
