@@ -29,9 +29,9 @@ from .tessellation import Int64
 _SHARE = 0.5
 #: Squared error that is left of a cell once it is split: half where light steps, a sixteenth where it curves.
 _KEPT = 0.25
-#: Where there is no room for all, a cell is cut along a contour if light there misses a line, squared, by so many times
-#: the squared error of a cell that is not split yet: a cut makes half as many cells as a split and leaves less error,
-#: and after more rounds, or in smaller cells, what is not split has less.
+#: Where there is no room for all, a cell is cut along a contour if its step, squared, is so many times the squared
+#: error of a cell not split yet: a cut makes half as many cells as a split and leaves less error, and from round to
+#: round the error of those that are not split falls.
 _CUT = 0.25
 #: How often errors that are mostly noise are averaged with those around them.
 _BLURS = 2

@@ -113,7 +113,7 @@ class _Look:
 class _Crossings:
     """Of edges (e,): a place from the first end to the second where a contour that matters crosses each, nan where none
     does; where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side; and
-    by how much irradiance a line from end to end would be wrong.
+    by how much irradiance differs there.
     """
 
     place: Float64
@@ -176,7 +176,7 @@ class Contours:
 
     def cut(self, receivers: Receivers, least: float = 0.0) -> tuple[Receivers, Int64]:
         """The receivers with cells cut along the contours; and for each new cell the one it came from. least: a shadow
-        is left alone where what a line would miss, squared, in radiance, times the area of the cell is less.
+        is left alone where its step, squared, in radiance, times the area of the cell that it crosses is less.
         """
         source = np.arange(len(receivers.cells))
         if self._nothing_to_find:
@@ -259,9 +259,9 @@ class Contours:
                 before = seen[there]
                 place = self._place(receivers, each, before, seen[step[some] + 1, some], step[some], bits[some])
                 inward = np.where(bits[some] < _COVERED, 0, np.where(before >= _COVERED, -1, 1))
-                missed, outline = matter(receivers, each, place)
-                matters = missed > 0.0
-                found[some[matters]] = _Crossings(place, outline * inward, missed)[matters]
+                light_steps, outline = matter(receivers, each, place)
+                matters = light_steps > 0.0
+                found[some[matters]] = _Crossings(place, outline * inward, light_steps)[matters]
 
         changes = seen[1:] ^ seen[:-1]
         # Where something is covered nothing else counts.
@@ -343,8 +343,8 @@ class Contours:
         return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
 
     def _kinks(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
-        """By how much a line from end to end would miss the light on edges (e,) that a shadow crosses, 0 where that is
-        little; and that it is no outline."""
+        """How far light steps on edges (e,) that a shadow crosses, 0 where a line from end to end would miss little of
+        it; and that it is no outline."""
         beside = np.clip(np.stack([place - _NEAR, place + _NEAR]), _PLACES[0], _PLACES[-1])
         places = np.concatenate([np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(place))), beside])
         every = edges.only(np.tile(np.arange(len(place)), len(places)))
@@ -353,9 +353,9 @@ class Contours:
         self.rays += found.rays
         light = found.grey.reshape(places.shape)
         # Not how steep it is: in a strip that is cut where a soft shadow begins that is even, up to where it is full.
-        missed = _off_the_line(light, places)
-        matters = (missed > _KINK * np.ptp(light, axis=0)) & (missed > _CONTRAST * light.max(axis=0))
-        return np.where(matters, missed, 0.0), np.zeros(len(place), dtype=bool)
+        missed, step = _off_the_line(light, places), np.ptp(light, axis=0)
+        matters = (missed > _KINK * step) & (missed > _CONTRAST * light.max(axis=0))
+        return np.where(matters, step, 0.0), np.zeros(len(place), dtype=bool)
 
     def _stands(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
         """By how much light differs on the two sides of what stands on edges (e,), 0 where that is little, and all of

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
@@ -13,6 +14,7 @@ from radiosity_baker.core.parallel import Workers
 from radiosity_baker.core.patches import Patches, make_patches, split_objects, unit_space
 from radiosity_baker.core.plan import Effort, choose_effort
 from radiosity_baker.core.progress import Progress
+from radiosity_baker.core.result import BakedObject
 from radiosity_baker.core.scene import AreaLamp, Scene, Surface
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.shapes import box, quad, sphere, triangles
@@ -46,6 +48,13 @@ def patches_of(scene: Scene, wanted: int) -> Patches:
     return make_patches(scene, unit_space(scene), split_objects(scene, wanted))
 
 
+def mean_light(baked: BakedObject) -> np.ndarray:
+    """The mean radiance (3,) over the surface of what was baked, however its triangles are spread."""
+    corners = baked.vertices[baked.triangles]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return area @ baked.layers["combined"].astype(float).mean(axis=1) / area.sum()
+
+
 @pytest.fixture(scope="session")
 def build() -> SimpleNamespace:
     """Builders of objects, scenes and stages, by name."""
@@ -58,6 +67,7 @@ def build() -> SimpleNamespace:
         furnished_room=furnished_room,
         effort=effort,
         patches=patches_of,
+        mean_light=mean_light,
     )
 
 

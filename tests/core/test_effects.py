@@ -66,10 +66,14 @@ def sky_with_a_spot() -> SkyMap:
     return SkyMap(pixels)
 
 
-def light(scene, **asked):
+def baked(scene, **asked):
     settings = replace(QUICK, **asked)
     effort = replace(choose_effort(scene, settings), patches=100)
-    return bake(scene, settings, effort=effort).objects[0].layers["combined"].astype(float)
+    return bake(scene, settings, effort=effort).objects[0]
+
+
+def light(scene, **asked):
+    return baked(scene, **asked).layers["combined"].astype(float)
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -86,13 +90,13 @@ def test_without_all_sources_the_scene_is_dark(everything):
 
 
 @pytest.mark.parametrize("name", ["point lamps", "spot lamps", "sun", "area lamps", "emitting surfaces", "sky"])
-def test_the_light_of_all_sources_is_the_sum_of_what_each_gives_alone(everything, name):
+def test_the_light_of_all_sources_is_the_sum_of_what_each_gives_alone(everything, name, build):
     """A source that is switched off takes its own light away and no other."""
     sources = ("point lamps", "spot lamps", "sun", "area lamps", "emitting surfaces", "sky")
-    alone = light(everything, effects={other: other == name for other in sources}).mean(axis=(0, 1))
-    rest = light(everything, effects={name: False}).mean(axis=(0, 1))
+    alone = build.mean_light(baked(everything, effects={other: other == name for other in sources}))
+    rest = build.mean_light(baked(everything, effects={name: False}))
     assert alone.max() > 0
-    assert alone + rest == pytest.approx(light(everything).mean(axis=(0, 1)), rel=0.05)
+    assert alone + rest == pytest.approx(build.mean_light(baked(everything)), rel=0.05)
 
 
 def test_without_bounces_only_straight_light_arrives(build):
