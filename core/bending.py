@@ -29,9 +29,9 @@ from .tessellation import Int64
 _SHARE = 0.5
 #: Squared error that is left of a cell once it is split: half where light steps, a sixteenth where it curves.
 _KEPT = 0.25
-#: Where there is no room for all, a cell is cut along a contour if its step, squared, is so many times the squared
-#: error of a cell not split yet: a cut makes half as many cells as a split and leaves less error, and from round to
-#: round the error of those that are not split falls.
+#: Where there is no room for all, a cell is cut along a contour if the step there, squared, times its area, is this
+#: share of the squared error of the worst cell that is not split: a cut makes half as many cells as a split and leaves
+#: less error, and a contour in tatters is worse to see than coarse cells. A cut for all is worse again, and so is six.
 _CUT = 0.25
 #: How often errors that are mostly noise are averaged with those around them.
 _BLURS = 2

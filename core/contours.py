@@ -6,15 +6,14 @@ with values of its own on either side, the light is linear again, whatever the s
 light with size is cut twice, where it begins and where it is full: between the two is a strip of triangles.
 
 Neighbouring cells that have other lights in view are where contours are looked for, and from there they are followed
-from edge to edge. On an edge, bisection finds the place. Of many lights whose shadows cross an edge the one that steps
-most is cut along first, and the pieces are looked at again. A contour is left alone where a line from end to end of
-the edge shows the light about as well: a shadow that is soft over all of the edge.
+from edge to edge. On an edge, bisection finds the place. Where the shadows of many lights cross an edge, the one that
+steps most is tried first, and pieces are looked at again. A contour is left alone where a line from end to end of the
+edge shows the light about as well: a shadow that is soft over all of it.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 
@@ -43,8 +42,10 @@ _SNAP = 0.015
 #: How far within what is covered a cut is put, relative to that: a little of its dark would show.
 _WITHIN = 0.5
 #: A shadow counts when light along the edge, and so near to the contour, is off a line from end to end by so much, as a
-#: share of how far light changes there, and of the light.
-_NEAR, _KINK, _CONTRAST = 0.02, 0.1, 0.1
+#: share of how far light changes there, and of the most light there; and by so many standard deviations of its noise.
+_NEAR, _KINK, _CONTRAST, _SIGNIFICANT = 0.02, 0.1, 0.1, 3.0
+#: The shadows of so many lights are tried on an edge.
+_SHADOWS = 3
 #: How far beside what stands on a surface light is looked at, relative to the edge.
 _BESIDE = 0.25
 #: What stands on a surface, however thin, counts when light differs by this share on its two sides.
@@ -246,53 +247,61 @@ class Contours:
 
     def _crossings(self, receivers: Receivers, edges: _Edges) -> _Crossings:
         """The same where nothing is known yet: outlines of what stands on the surface first, and shadows on edges that
-        none crosses."""
+        none of these crosses."""
         seen = self._on_edges(receivers, edges, np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(edges.cell))))
         found = _Crossings.none(len(edges.cell))
-
-        def cross(
-            bits: Int64, step: Int64, matter: Callable[[Receivers, _Edges, Float64], tuple[Float64, Bool]]
-        ) -> None:
-            some = np.flatnonzero((bits > 0) & ~np.isfinite(found.place))
-            if len(some):
-                each, there = edges.only(some), (step[some], some)
-                before = seen[there]
-                place = self._place(receivers, each, before, seen[step[some] + 1, some], step[some], bits[some])
-                inward = np.where(bits[some] < _COVERED, 0, np.where(before >= _COVERED, -1, 1))
-                light_steps, outline = matter(receivers, each, place)
-                matters = light_steps > 0.0
-                found[some[matters]] = _Crossings(place, outline * inward, light_steps)[matters]
-
         changes = seen[1:] ^ seen[:-1]
-        # Where something is covered nothing else counts.
+        # Where something is covered, nothing else that stands there counts.
         bits = np.where((changes >= _COVERED).any(axis=0), _COVERED, _BARRED)
         differs = (changes & bits) != 0
-        cross(bits * differs.any(axis=0), differs.argmax(axis=0), self._stands)
-        cross(*self._strongest(receivers, edges, seen), self._kinks)
+        some = np.flatnonzero(differs.any(axis=0))
+        if len(some):
+            interval = differs.argmax(axis=0)[some]
+            found[some] = self._outlines(receivers, edges.only(some), seen[:, some], interval, bits[some])
+        for _ in range(_SHADOWS):
+            rest = np.flatnonzero(np.isnan(found.place))
+            bits, interval, brings = self._strongest(receivers, edges.only(rest), seen[:, rest])
+            dark = np.flatnonzero(bits)
+            if not len(dark):
+                break
+            some = rest[dark]
+            sights = seen[:, some], interval[dark], bits[dark]
+            found[some] = self._shadows(receivers, edges.only(some), *sights, brings[dark])
+            seen[:, some] &= ~bits[dark]
         return found
 
-    def _strongest(self, receivers: Receivers, edges: _Edges, seen: Int64) -> tuple[Int64, Int64]:
+    def _strongest(self, receivers: Receivers, edges: _Edges, seen: Int64) -> tuple[Int64, Int64, Float64]:
         """Of the lights of which so much is seen (p, e) at the places of the edges, the bits (e,) of that whose shadow
-        makes the largest step between two of them, 0 where none does, and where (e,) it does."""
-        middles = Points(receivers.cells, edges.cell, edges.weights(np.full(len(edges.cell), 0.5)))
-        bits, place = np.zeros((2, len(edges.cell)), dtype=np.int64)
-        largest = np.zeros(len(bits))
+        makes the largest step from one place to the next, 0 where none does; in which interval (e,) it does; and the
+        irradiance (e,) that this light brings with nothing in the way."""
+        bits, interval = np.zeros((2, len(edges.cell)), dtype=np.int64)
+        brings, largest = np.zeros((2, len(edges.cell)))
         for number, light in enumerate(self._light.lights if self._lights else []):
             hidden = (seen >> number & 1) + (seen >> _WHOLE + number & 1)
             change = np.abs(np.diff(hidden, axis=0))
-            most = change.max(axis=0)
-            step = most * light.share(middles.positions, middles.shading) * light.color.mean()
-            more = step > largest
-            bits[more], largest[more], place[more] = _bits_of(number), step[more], change.argmax(axis=0)[more]
-        return bits, place
+            some = np.flatnonzero(change.any(axis=0))
+            if not len(some):
+                continue
+            where, each = change[:, some].argmax(axis=0), edges.only(some)
+            share = np.zeros(len(some))
+            for place in (_PLACES[where], _PLACES[where + 1]):
+                points = Points(receivers.cells, each.cell, each.weights(place))
+                share = np.maximum(share, light.share(points.positions, points.shading))
+            share *= light.color.mean()
+            step = share * change[where, some]
+            more = step > largest[some]
+            some = some[more]
+            bits[some], interval[some] = 1 << number | 1 << _WHOLE + number, where[more]
+            brings[some], largest[some] = share[more], step[more]
+        return bits, interval, brings
 
-    def _place(
-        self, receivers: Receivers, edges: _Edges, before: Int64, after: Int64, step: Int64, bits: Int64
-    ) -> Float64:
-        """Where (e,) on each edge something of the bits (e,) first differs from what is seen (e,) before that step
-        (e,) from place to place, as it does after (e,) it."""
-        low, width = _PLACES[step], (_PLACES[1:] - _PLACES[:-1])[step]
-        differs, each = (before ^ after) & bits, np.arange(len(step))
+    def _place(self, receivers: Receivers, edges: _Edges, seen: Int64, interval: Int64, bits: Int64) -> Float64:
+        """Where (e,) on each edge, of which so much is seen (p, e) at places, something of the bits (e,) first differs
+        in an interval (e,) from what it is at its beginning."""
+        each = np.arange(len(interval))
+        before, after = seen[interval, each], seen[interval + 1, each]
+        low, width = _PLACES[interval], (_PLACES[1:] - _PLACES[:-1])[interval]
+        differs = (before ^ after) & bits
         for _ in range(_NARROWINGS):
             width = width / (_BETWEEN + 1)
             between = self._on_edges(receivers, edges, low + np.arange(1, _BETWEEN + 1)[:, None] * width, differs)
@@ -342,9 +351,11 @@ class Contours:
         self.rays += sum((rays for _, rays in found), Counter())
         return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
 
-    def _kinks(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
-        """How far light steps on edges (e,) that a shadow crosses, 0 where a line from end to end would miss little of
-        it; and that it is no outline."""
+    def _shadows(
+        self, receivers: Receivers, edges: _Edges, seen: Int64, interval: Int64, bits: Int64, brings: Float64
+    ) -> _Crossings:
+        """Where shadows of lights that bring so much (e,) cross the edges, if a line from end to end would miss any."""
+        place = self._place(receivers, edges, seen, interval, bits)
         beside = np.clip(np.stack([place - _NEAR, place + _NEAR]), _PLACES[0], _PLACES[-1])
         places = np.concatenate([np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(place))), beside])
         every = edges.only(np.tile(np.arange(len(place)), len(places)))
@@ -352,14 +363,17 @@ class Contours:
         found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
         self.rays += found.rays
         light = found.grey.reshape(places.shape)
-        # Not how steep it is: in a strip that is cut where a soft shadow begins that is even, up to where it is full.
-        missed, step = _off_the_line(light, places), np.ptp(light, axis=0)
-        matters = (missed > _KINK * step) & (missed > _CONTRAST * light.max(axis=0))
-        return np.where(matters, step, 0.0), np.zeros(len(place), dtype=bool)
+        # That of all places together: of a single one the rays hardly know it.
+        noise = np.sqrt(found.variance.mean(axis=1).reshape(places.shape).mean(axis=0))
+        # Steepness would not tell: a strip that is cut where a soft shadow begins is even, up to where it is full.
+        missed, step = _off_the_line(light, places), np.minimum(np.ptp(light, axis=0), brings)
+        matters = np.minimum(missed, brings) > np.maximum(_KINK * step, _CONTRAST * light.max(axis=0))
+        matters &= missed > _SIGNIFICANT * noise
+        return _Crossings(np.where(matters, place, np.nan), np.zeros(len(place), dtype=np.int64), step)
 
-    def _stands(self, receivers: Receivers, edges: _Edges, place: Float64) -> tuple[Float64, Bool]:
-        """By how much light differs on the two sides of what stands on edges (e,), 0 where that is little, and all of
-        it next to the outline of what hides one side; and where there is such an outline."""
+    def _outlines(self, receivers: Receivers, edges: _Edges, seen: Int64, interval: Int64, bits: Int64) -> _Crossings:
+        """Where what stands on the surface crosses the edges, if it hides one side, or parts light from dark."""
+        place = self._place(receivers, edges, seen, interval, bits)
         beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), _PLACES[0], _PLACES[-1])
         every = edges.only(np.tile(np.arange(len(place)), 2))
         points = Points(receivers.cells, every.cell, every.weights(beside.ravel()))
@@ -371,9 +385,11 @@ class Contours:
         one, other = found.grey.reshape(2, -1) + look.light
         parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) :])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
-        step = np.where(parted, np.abs(one - other), 0.0)
         # What is hidden says nothing, so next to it all of the light may be wrong.
-        return np.where(look.outlines, np.maximum(np.maximum(one, other), np.finfo(float).tiny), step), look.outlines
+        step = np.where(look.outlines, np.maximum(one, other), np.abs(one - other))
+        covered = seen[interval, np.arange(len(place))] >= _COVERED
+        inward = np.where(look.outlines & (bits == _COVERED), np.where(covered, -1, 1), 0)
+        return _Crossings(np.where(look.outlines | parted, place, np.nan), inward, step)
 
     def _look(self, points: Points, reach: Float64, number: int) -> _Look:
         """Looks around from points (2 n,) on two sides of n places, of which something within reach (2 n,) above them
@@ -428,11 +444,6 @@ def _part(one: Int64, other: Int64) -> Bool:
     """Whether a light is in sight as a whole on one side and hidden on the other, or one of them is covered: (n,)."""
     lights = (1 << _WHOLE) - 1
     return np.asarray(((one >> _WHOLE & ~other | other >> _WHOLE & ~one) & lights | (one ^ other) & _COVERED) > 0)
-
-
-def _bits_of(light: int) -> int:
-    """That some of a light is hidden, and that all of it is."""
-    return 1 << light | 1 << _WHOLE + light
 
 
 def _off_the_line(light: Float64, places: Float64) -> Float64:
