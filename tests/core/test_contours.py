@@ -86,8 +86,8 @@ def test_a_soft_shadow_is_a_strip():
 @pytest.mark.parametrize("angle", [1.0, 2.0, 4.0, 8.0])
 @pytest.mark.parametrize("degrees", [0.0, 22.5])
 def test_soft_shadows_have_no_teeth_whether_wide_or_narrow(degrees, angle):
-    """From an eighth of a cell of the start to all of one: triangles that are only small have higher teeth, and it takes
-    two to four times as many."""
+    """From an eighth of a cell of the start to all of one: triangles that are only small have higher teeth, and there
+    are two to four times as many."""
     baked, along, across = half_shaded(degrees, np.radians(angle))
     radius = np.tan(np.radians(angle / 2))
     steps = np.linspace(-0.6, 0.6, 121)
