@@ -24,6 +24,7 @@ from .direct.illumination import MOST_CONTOURED, DirectLight
 from .gather import Points, gather_direct
 from .keys import key
 from .parallel import Workers
+from .patches import Cells
 from .receivers import Receivers, cell_colours, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
 from .scene import Bool, Float64, Scene
@@ -97,6 +98,11 @@ class _Edges:
         """Weights (e, 3) of the places (e,) from the first end to the second, a little to the inside of the cell."""
         along = place[:, None]
         return (1.0 - _ASIDE) * ((1.0 - along) * self.first + along * self.second) + _ASIDE * self.opposite
+
+    def at(self, places: Float64, cells: Cells) -> Points:
+        """Points at places (p, e) of the edges, (p * e,) of them: those at the first place of each edge first."""
+        every = self.only(np.tile(np.arange(len(self.cell)), len(places)))
+        return Points(cells, every.cell, every.weights(places.ravel()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -283,11 +289,8 @@ class Contours:
             if not len(some):
                 continue
             where, each = change[:, some].argmax(axis=0), edges.only(some)
-            share = np.zeros(len(some))
-            for place in (_PLACES[where], _PLACES[where + 1]):
-                points = Points(receivers.cells, each.cell, each.weights(place))
-                share = np.maximum(share, light.share(points.positions, points.shading))
-            share *= light.color.mean()
+            points = each.at(_PLACES[np.stack([where, where + 1])], receivers.cells)
+            share = light.share(points.positions, points.shading).reshape(2, -1).max(axis=0) * light.color.mean()
             step = share * change[where, some]
             more = step > largest[some]
             some = some[more]
@@ -312,13 +315,12 @@ class Contours:
 
     def _on_edges(self, receivers: Receivers, edges: _Edges, places: Float64, asked: Int64 | None = None) -> Int64:
         """What is in sight (p, e) at places (p, e) of the edges; only what the bits (e,) ask for, if given."""
-        every = edges.only(np.tile(np.arange(len(edges.cell)), len(places)))
-        points = Points(receivers.cells, every.cell, every.weights(places.ravel()))
+        points = edges.at(places, receivers.cells)
         solids = asked is None or bool((asked >= _BARRED).any())
         lights = None if asked is None else np.tile(asked | asked >> _WHOLE, len(places))
-        sight = self._sight(points, GAP * every.length if solids else None, lights)
+        sight = self._sight(points, GAP * np.tile(edges.length, len(places)) if solids else None, lights)
         if solids:
-            start = Points(receivers.cells, every.cell, every.weights(np.full(places.size, _PLACES[0])))
+            start = edges.at(np.full(places.shape, _PLACES[0]), receivers.cells)
             sight = sight + _BARRED * self._barred(start, points.positions)
         return sight.reshape(places.shape)
 
@@ -358,8 +360,7 @@ class Contours:
         place = self._place(receivers, edges, seen, interval, bits)
         beside = np.clip(np.stack([place - _NEAR, place + _NEAR]), _PLACES[0], _PLACES[-1])
         places = np.concatenate([np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(place))), beside])
-        every = edges.only(np.tile(np.arange(len(place)), len(places)))
-        points = Points(receivers.cells, every.cell, every.weights(places.ravel()))
+        points = edges.at(places, receivers.cells)
         found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
         self.rays += found.rays
         light = found.grey.reshape(places.shape)
@@ -375,11 +376,10 @@ class Contours:
         """Where what stands on the surface crosses the edges, if it hides one side, or parts light from dark."""
         place = self._place(receivers, edges, seen, interval, bits)
         beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), _PLACES[0], _PLACES[-1])
-        every = edges.only(np.tile(np.arange(len(place)), 2))
-        points = Points(receivers.cells, every.cell, every.weights(beside.ravel()))
+        points = edges.at(beside, receivers.cells)
         found, look = self._workers.beside(
             partial(gather_direct, points, self._light, _SHADOW_RAYS, self._seed, _STREAM + 1, self._workers),
-            partial(self._look, points, GAP * every.length, 0),
+            partial(self._look, points, GAP * np.tile(edges.length, 2), 0),
         )
         self.rays += found.rays + look.rays
         one, other = found.grey.reshape(2, -1) + look.light

@@ -11,7 +11,7 @@ import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.parallel import Workers
-from radiosity_baker.core.patches import Patches, make_patches, split_objects, unit_space
+from radiosity_baker.core.patches import Patches, make_patches, split_objects, triangle_geometry, unit_space
 from radiosity_baker.core.plan import Effort, choose_effort
 from radiosity_baker.core.progress import Progress
 from radiosity_baker.core.result import BakedObject
@@ -50,8 +50,7 @@ def patches_of(scene: Scene, wanted: int) -> Patches:
 
 def mean_light(baked: BakedObject) -> np.ndarray:
     """The mean radiance (3,) over the surface of what was baked, however its triangles are spread."""
-    corners = baked.vertices[baked.triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = triangle_geometry(baked.vertices[baked.triangles])[1]
     return area @ baked.layers["combined"].astype(float).mean(axis=1) / area.sum()
 
 
