@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from .reconstruction import Fit, Samples, Smoothing, within
-from .scene import Float64
+from .scene import Bool, Float64
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,9 +171,7 @@ def cross_validate(
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
     distance = told[0] - sharpest.spread(fit) / 2.0
-    unseen = _unresolved(bend, distance, own_noise, area * shown)
-    # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
-    unseen[fit.broken] = np.maximum((distance - own_noise)[fit.broken], unseen[fit.broken])
+    unseen = _unresolved_by_kind(fit.broken, bend, distance, own_noise, area * shown)
     sampling = np.zeros_like(area)
     for number, smoothed in enumerate(tried):
         share = (own_level == number).mean(axis=1)
@@ -213,6 +211,26 @@ class _Halves:
         """(c,) squared change from a sharper fit, unbiased: the product of what two independent halves say of it."""
         one, other = self.first - sharper.first, self.second - sharper.second
         return (squared_mean(fit.at_corners(one + other)) - squared_mean(fit.at_corners(one - other))) / 4.0
+
+
+def _unresolved_by_kind(broken: Bool, bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:
+    """As `_unresolved`, but of cells (c,) beside a break (c,), of others whose samples are certain, and of the rest,
+    each kind for itself: the doubts of one say nothing of another."""
+    unseen, certain = np.zeros_like(bend), noise <= 0.0
+    for kind in (broken, certain & ~broken, ~certain & ~broken):
+        unseen[kind] = _unresolved(bend[kind], distance[kind], noise[kind], weight[kind])
+    # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
+    left = _without_negatives((distance - noise)[broken], weight[broken])
+    unseen[broken] = np.maximum(left, unseen[broken])
+    return unseen
+
+
+def _without_negatives(left: Float64, weight: Float64) -> Float64:
+    """What is left (n,) when noise is taken away, of which much is noise still, as often below zero as above: where it
+    is above, but no more in all."""
+    above = np.maximum(left, 0.0)
+    in_all = float(weight @ above)
+    return above * (max(float(weight @ left), 0.0) / in_all if in_all > 0.0 else 0.0)
 
 
 def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:

@@ -87,6 +87,8 @@ class Bends:
             survey.recall(earlier)
         for _ in range(BEND_PASSES):
             survey.run_pass()
+        # Across soft shadows so few rays leave little but noise to choose by.
+        survey.refine_boundaries(BEND_PASSES)
         self.rays += survey.rays
         return survey
 

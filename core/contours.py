@@ -192,6 +192,7 @@ class Contours:
         sight = self._sight(middles, GAP * middles.size)
         near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
+        uncut = [len(mesh.vertices) for mesh in receivers.fine]
         contoured = np.zeros(len(source), dtype=bool)
         # In radiance, squared, times the area.
         shown = cell_colours(self._scene, receivers).shown_in_white * receivers.cells.area if least > 0.0 else None
@@ -210,7 +211,9 @@ class Contours:
             places = found.place[number]
             receivers, piece = cut_cells(receivers, places)
             near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
-        return replace(receivers, breaks=self._breaks(receivers, contoured, sight[source])), source
+        on_contour = np.concatenate([mesh.triangles >= n for mesh, n in zip(receivers.fine, uncut, strict=True)])
+        breaks = self._breaks(receivers, contoured, sight[source])
+        return replace(receivers, breaks=breaks, on_contour=on_contour), source
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
         """Cells (c,) with others around them from whose middles other lights are in sight (c,), or that are covered."""

@@ -27,7 +27,8 @@ def turn_diagonals(receivers: Receivers, light: Float64, fixed: Bool) -> Int64:
     """For each corner of the output triangles (e, 3) the number 3 e + i of the corner it is to be instead.
 
     light (v,): at the fit vertices. Diagonals stay beside fixed (e,) triangles, where triangles are not parts of one of
-    the input's, and where the fit breaks: there they are cut to where the light jumps.
+    the input's, where the fit breaks: there they are cut to where the light jumps; and on contours, where light has a
+    kink that no jump of the gradient is too much for.
     """
     fixed = fixed | receivers.broken
     corner = np.arange(receivers.corner_vertex.size).reshape(-1, 3)
@@ -70,6 +71,9 @@ class _Quads:
         apex, far = next_corner(here[:, 1]), next_corner(next_corner(back))
         beyond = over[np.stack([here[:, 1], apex, next_corner(back), far], axis=1)]
         movable = (parent[first] == parent[second]) & ~fixed[first] & ~fixed[second]
+        if receivers.on_contour is not None:
+            on_contour = receivers.on_contour.ravel()[corner.ravel()]
+            movable &= ~on_contour[here].all(axis=1)
         corners = corner.ravel()[np.stack([here[:, 0], here[:, 1], apex, far], axis=1)]
         return cls(first, second, corners, beyond, movable)
 

@@ -43,7 +43,8 @@ class Receivers:
 
     first (r + 1,): where each receiver's output triangles begin. element_surface (e,): theirs, into Scene.surfaces.
     places (e, 3, k): what else, if given, breaks the fit where it changes over an edge. breaks (e, 3): sides, from each
-    corner to the next, over which light jumps, so that the fit breaks there; None if there is none.
+    corner to the next, over which light jumps, so that the fit breaks there; None if there is none. on_contour (e, 3):
+    corners that were made by cutting along contours; None if nothing was cut.
     """
 
     space: Space
@@ -55,6 +56,7 @@ class Receivers:
     element_surface: Int32
     places: Float64 | None = None
     breaks: Bool | None = None
+    on_contour: Bool | None = None
 
     @property
     def corner_vertex(self) -> Int32:

@@ -219,8 +219,10 @@ class Survey:
         return ~out_of_sight(points, around, enclosed, total, direct, self.mean, look)
 
     def refine_boundaries(self, passes: int) -> None:
-        """More points, for direct light only, in the cells where shadow boundaries leave it uncertain."""
-        chosen = np.flatnonzero(self._uncertain() & ~self.invalid)
+        """More points, for direct light only, in the cells where shadow boundaries leave it uncertain. Those that were
+        recalled have had theirs."""
+        uncertain = self._uncertain() & ~self.invalid
+        chosen = self._fresh[uncertain[self._fresh]]
         if not len(chosen):
             return
         together = max(_BESIDE // len(chosen), 1)

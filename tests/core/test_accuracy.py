@@ -11,6 +11,7 @@ from radiosity_baker.core.accuracy import (
     PARABOLA_BEND,
     STEP_BEND,
     _unresolved,
+    _unresolved_by_kind,
     cross_validate,
     fit_halves,
     level_error,
@@ -156,6 +157,32 @@ def test_two_witnesses_count_by_what_they_know():
     # Noise a hundred times as large as what is left of it is not known so well that the samples could tell.
     noisy = _unresolved(many, np.full(1000, 202 * middle), np.full(1000, 200 * middle), each).mean()
     assert middle < noisy < 1.5 * middle
+
+
+def test_noise_beside_a_break_is_no_error():
+    """Of 1000 cells whose samples lie as far from the fit as their noise says, on average, half lie farther. What is
+    left in all is within four deviations of nothing; and where there is an error, all of it is found."""
+    rng = np.random.default_rng(6)
+    noise, weight, broken = np.ones(1000), np.full(1000, 1e-3), np.ones(1000, dtype=bool)
+    distance = rng.standard_normal((1000, 4)) ** 2 @ np.full(4, 0.25)
+    found = _unresolved_by_kind(broken, np.zeros(1000), distance, noise, weight)
+    assert found.min() >= 0.0
+    assert weight @ found < 4.0 * np.sqrt(2.0 / 4.0 / 1000)
+    assert weight @ np.maximum(distance - noise, 0.0) > 0.2
+    found = _unresolved_by_kind(broken, np.zeros(1000), distance + 3.0, noise, weight)
+    assert weight @ found == pytest.approx(3.0 + weight @ (distance - noise))
+
+
+def test_what_is_doubtful_of_one_kind_says_nothing_of_another():
+    """Certain samples tell the error of their own cells, beside noisy ones and beside breaks."""
+    bend, weight = np.full(300, 1.0), np.full(300, 1 / 300)
+    noise = np.repeat([0.0, 100.0, 0.0], 100)
+    distance = noise + np.repeat([1 / 40, 5.0, 5.0], 100)
+    broken = np.repeat([False, False, True], 100)
+    found = _unresolved_by_kind(broken, bend, distance, noise, weight)
+    assert found[:100] == pytest.approx(1 / 40, rel=0.02)
+    assert found[200:] == pytest.approx(5.0)
+    assert _unresolved(bend, distance, noise, weight)[:100].mean() > 2 / 40
 
 
 def test_the_mean_of_a_squared_linear_function():

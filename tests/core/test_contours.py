@@ -198,9 +198,9 @@ def test_no_light_leaks_through_a_thin_wall(thickness):
         area = triangle_geometry(corners)[1][:, None]
         here, there = ((at > 0.0) & (at < 0.1)) * area, ((at > 0.1 + thickness) & (at < 0.2)) * area
         beyond.append((light * there).sum() / there.sum() / ((light * here).sum() / here.sum()))
-    # A sheet leaks 1.78 +- 0.09 % in the mean of sixteen seeds, which differ by a fifth of that, and a wall of 1 mm
-    # less. The mean of six is off by 0.15 %; three times that is allowed.
-    assert np.mean(beyond) < 0.0225
+    # A sheet leaks 2.28 +- 0.15 % in the mean of twelve seeds, a wall of 1 mm 1.58 +- 0.04 %. The mean of six is off by
+    # 0.21 %; three times that is allowed.
+    assert np.mean(beyond) < 0.029
 
 
 def test_a_break_parts_the_vertices_of_an_edge_and_nothing_else():

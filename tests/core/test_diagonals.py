@@ -94,6 +94,19 @@ def test_nothing_turns_beside_what_is_fixed_or_over_a_break(grid):
     np.testing.assert_array_equal(turn_diagonals(broken, at_vertices(broken), nothing(grid)), every)
 
 
+def test_a_contour_stays_whole(grid):
+    """Whatever light does there: what runs along a contour has both its ends on it."""
+    every = np.arange(grid.corner_vertex.size).reshape(-1, 3)
+    place = grid.meshes[0].vertices[grid.meshes[0].triangles]
+    step = np.zeros(grid.vertices)
+    step[grid.corner_vertex] = place[..., 0] + place[..., 1] > 0.55
+    assert (turn_diagonals(grid, step, nothing(grid)) != every).any()
+    drawn = replace(grid, on_contour=np.ones(every.shape, dtype=bool))
+    np.testing.assert_array_equal(turn_diagonals(drawn, step, nothing(grid)), every)
+    apart = replace(grid, on_contour=np.zeros(every.shape, dtype=bool))
+    np.testing.assert_array_equal(turn_diagonals(apart, step, nothing(grid)), turn_diagonals(grid, step, nothing(grid)))
+
+
 def test_all_layers_keep_their_values_at_the_vertices(build, monkeypatch):
     """Bakes with turned diagonals and without differ by the triangles between the vertices, and by nothing else."""
     asked = Settings(triangles=2000, error=0.05, threads=2, layers=("combined", "indirect", "error", "triangles"))

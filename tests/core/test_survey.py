@@ -91,6 +91,25 @@ def test_after_the_recalled_passes_every_cell_is_looked_at_again(surveyed):
     assert np.array_equal(second.direct[0].moments[here], first.direct[0].moments[there])
 
 
+def test_shadow_boundaries_are_looked_at_once(surveyed):
+    """Recalled cells had their turn in the earlier survey."""
+    first, _, _, _ = surveyed
+    seen = first.valid_samples.sum()
+    first.refine_boundaries(4)
+    assert first.valid_samples.sum() > seen
+    chosen = np.arange(len(first.receivers.cells)) % 7 == 0
+    split, _ = split_cells(first.receivers, chosen)
+    second = Survey(split, first._light, None, first._effort, 2, first.workers)
+    second.recall(first)
+    second.run_pass()
+    second.run_pass()
+    here, there = same_cells(split.cells, first.receivers.cells)
+    fresh = np.setdiff1d(np.arange(len(split.cells)), here)
+    second.refine_boundaries(4)
+    assert np.array_equal(second.valid_samples[here], first.valid_samples[there])
+    assert second.valid_samples[fresh].max() == 6
+
+
 @pytest.fixture
 def looked_around(build, workers):
     """Two passes in a furnished room, direct light and what its patches reflect."""
