@@ -27,17 +27,23 @@ from .scene import Bool, Float64
 @dataclass(frozen=True, eq=False)
 class Fitted:
     """A fit: alpha (v,); the limits (v, k) of its values; vertex values (v, k) of all samples together, and their mean
-    light (v,); squared error of each cell (c,) by sampling and by resolution, of the mean light; the mean light of the
-    halves; how many samples of each cell (c,) told so."""
+    light (v,); squared error of each cell (c,) of the mean light: by sampling, by what the triangles cannot show, by
+    what smoothing has taken; the mean light of the halves; how many samples of each cell (c,) told so."""
 
     alpha: Float64
     limits: tuple[Float64, Float64]
     values: Float64
     grey: Float64
     sampling: Float64
-    resolution: Float64
+    unresolved: Float64
+    smoothed: Float64
     halves: _Halves
     tried: Float64
+
+    @property
+    def resolution(self) -> Float64:
+        """(c,) squared error that stays however many samples there are."""
+        return self.unresolved + self.smoothed
 
 
 @dataclass(frozen=True)
@@ -171,15 +177,23 @@ def cross_validate(
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
     distance = told[0] - sharpest.spread(fit) / 2.0
-    unseen = _unresolved_by_kind(fit.broken, bend, distance, own_noise, area * shown)
-    sampling = np.zeros_like(area)
-    for number, smoothed in enumerate(tried):
+    unresolved = _unresolved_by_kind(fit.broken, bend, distance, own_noise, area * shown)
+    sampling, smoothed = np.zeros((2, len(area)))
+    for number, smoother_one in enumerate(tried):
         share = (own_level == number).mean(axis=1)
-        sampling += share * smoothed.spread(fit) / 4.0
-        unseen += share * smoothed.smoothed_by(sharpest, fit)
+        sampling += share * smoother_one.spread(fit) / 4.0
+        smoothed += share * smoother_one.smoothed_by(sharpest, fit)
     last = _Halves(best[0][:, 0], best[1][:, 0])
     return Fitted(
-        np.array(ALPHAS)[level], limits, last.mean[:, None], last.mean, sampling, unseen, last, _tried(halves)
+        alpha=np.array(ALPHAS)[level],
+        limits=limits,
+        values=last.mean[:, None],
+        grey=last.mean,
+        sampling=sampling,
+        unresolved=unresolved,
+        smoothed=smoothed,
+        halves=last,
+        tried=_tried(halves),
     )
 
 

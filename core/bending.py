@@ -97,12 +97,11 @@ class Bends:
         many that what is left is allowed, while there is room; and whether it will be once they are split, so that
         nobody need look again; and the largest squared error of those for which there is no room."""
         found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
-        direct, *indirect = (fitted.resolution for fitted in found.fits)
+        # What smoothing takes for want of samples, smaller triangles do not bring back.
+        direct, *indirect = (fitted.unresolved for fitted in found.fits)
         # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
-        errors = [direct, *(_blurred(error, survey.receivers) for error in indirect)]
-        weight = found.area * found.shown
-        # What is below zero as a whole is noise, and must not make up for an error of the other.
-        pieces = weight * sum(error * (weight @ error > 0.0) for error in errors)
+        blurred = [_blurred(error, survey.receivers) for error in indirect]
+        pieces = found.area * found.shown * sum(blurred, direct)
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)

@@ -82,8 +82,10 @@ class Survey:
         #: How often there were more points for direct light, and for indirect light.
         self._extra, self._longer = 0, 0
         self.mean = 0.0
-        #: The cells that were not recalled, and how many passes are for them alone.
+        #: The cells that were not recalled, how many passes are for them alone, and which were recalled with more points
+        #: than that.
         self._fresh, self._recalled = np.arange(count), 0
+        self._refined = np.zeros(count, dtype=bool)
 
     def recall(self, earlier: Survey) -> None:
         """Before the first pass: take the samples of the cells that an earlier survey had as well; as many passes as it
@@ -102,6 +104,7 @@ class Survey:
         self.mean = earlier.mean
         self._shift[here] = earlier._shift[there]
         self._fresh, self._recalled = np.setdiff1d(self._fresh, here), earlier.passes
+        self._refined[here] = (earlier.direct[0].tried + earlier.direct[1].tried)[there] > earlier.passes
 
     def _index(self, number: int) -> NDArray[np.int64] | slice:
         """The cells that a pass looks at; a slice where they are all, for sums over that take no copies."""
@@ -220,9 +223,8 @@ class Survey:
 
     def refine_boundaries(self, passes: int) -> None:
         """More points, for direct light only, in the cells where shadow boundaries leave it uncertain. Those that were
-        recalled have had theirs."""
-        uncertain = self._uncertain() & ~self.invalid
-        chosen = self._fresh[uncertain[self._fresh]]
+        recalled with more of them have had their turn."""
+        chosen = np.flatnonzero(self._uncertain() & ~self.invalid & ~self._refined)
         if not len(chosen):
             return
         together = max(_BESIDE // len(chosen), 1)

@@ -92,8 +92,11 @@ def test_after_the_recalled_passes_every_cell_is_looked_at_again(surveyed):
 
 
 def test_shadow_boundaries_are_looked_at_once(surveyed):
-    """Recalled cells had their turn in the earlier survey."""
-    first, _, _, _ = surveyed
+    """Recalled cells had their turn in the earlier survey, or else have it now."""
+    first, later, _, _ = surveyed
+    here, _ = same_cells(later.receivers.cells, first.receivers.cells)
+    later.refine_boundaries(4)
+    assert later.valid_samples[here].max() == 6
     seen = first.valid_samples.sum()
     first.refine_boundaries(4)
     assert first.valid_samples.sum() > seen
@@ -105,8 +108,10 @@ def test_shadow_boundaries_are_looked_at_once(surveyed):
     second.run_pass()
     here, there = same_cells(split.cells, first.receivers.cells)
     fresh = np.setdiff1d(np.arange(len(split.cells)), here)
+    again = here[first.valid_samples[there] == 6]
     second.refine_boundaries(4)
-    assert np.array_equal(second.valid_samples[here], first.valid_samples[there])
+    assert len(again) > 0
+    assert (second.valid_samples[again] == 6).all()
     assert second.valid_samples[fresh].max() == 6
 
 
