@@ -82,8 +82,8 @@ class Survey:
         #: How often there were more points for direct light, and for indirect light.
         self._extra, self._longer = 0, 0
         self.mean = 0.0
-        #: The cells that were not recalled, how many passes are for them alone, and which were recalled with more points
-        #: than that.
+        #: The cells that were not recalled, how many passes are for these alone, and the recalled cells (c,) that have
+        #: more points than that.
         self._fresh, self._recalled = np.arange(count), 0
         self._refined = np.zeros(count, dtype=bool)
 
