@@ -228,10 +228,10 @@ class _Halves:
 
 
 def _unresolved_by_kind(broken: Bool, bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:
-    """As `_unresolved`, but of cells (c,) beside a break (c,), of others whose samples are certain, and of the rest,
-    each kind for itself: the doubts of one say nothing of another."""
-    unseen, certain = np.zeros_like(bend), noise <= 0.0
-    for kind in (broken, certain & ~broken, ~certain & ~broken):
+    """As `_unresolved`, but the cells (c,) beside a break (c,) and the others each for themselves: what the samples
+    tell beside a contour says nothing of smooth light."""
+    unseen = np.zeros_like(bend)
+    for kind in (broken, ~broken):
         unseen[kind] = _unresolved(bend[kind], distance[kind], noise[kind], weight[kind])
     # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
     left = _without_negatives((distance - noise)[broken], weight[broken])
