@@ -82,6 +82,8 @@ STEP_BEND, PARABOLA_BEND = 6.0, 70.0
 _ROUGH = 2e-3
 #: How many times as bright as its samples' mean a vertex begins at most.
 _MOST_BRIGHTER = 4.0
+#: Standard deviations beyond which nothing happens by chance.
+_SURE = 3.0
 #: By what share of itself the samples' own noise may be misjudged: the two sets of rays that tell are not quite
 #: independent.
 _MISJUDGED = 0.01
@@ -253,17 +255,21 @@ def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float6
 
     A bend is certain, but whether it means a step, a kink or a curve is not: then the error is a sixth to a seventieth
     of it. What is left is right on average, but a small difference of large numbers, however many there are: the noise
-    is not known any better than _MISJUDGED. Each counts by its variance.
+    is not known any better than _MISJUDGED. Each counts by its variance. Where surely more is left than a step would
+    leave, light changes inside cells, so that halves do not agree how it bends: then only the samples tell.
     """
     guess = max(float(weight @ bend), 0.0) / np.sqrt(STEP_BEND * PARABOLA_BEND)
     left = distance - noise
     doubt = float(np.sum((weight * left) ** 2)) + (_MISJUDGED * float(weight @ noise)) ** 2
-    if guess <= 0.0:
-        return np.zeros_like(bend)
-    told = (doubt * guess + guess**2 * float(weight @ left)) / (doubt + guess**2)
+    in_all = float(weight @ left)
+    told = (doubt * guess + guess**2 * in_all) / (doubt + guess**2) if guess > 0.0 else 0.0
     spread = np.sqrt(PARABOLA_BEND / STEP_BEND)
-    where = np.maximum(bend, 0.0)
-    return np.asarray(where * (np.clip(told, guess / spread, guess * spread) / float(weight @ where)))
+    told = float(np.clip(told, guess / spread, guess * spread))
+    surely = in_all - _SURE * np.sqrt(doubt)
+    where = np.maximum(bend if surely <= told else left, 0.0)
+    if max(told, surely) <= 0.0:
+        return np.zeros_like(bend)
+    return np.asarray(where * (max(told, surely) / float(weight @ where)))
 
 
 def squared_mean(corners: Float64) -> Float64:

@@ -115,6 +115,23 @@ def test_the_stated_error_is_the_true_one(floor, noise):
     assert 0.7 < np.sqrt(stated / true) < 1.5
 
 
+@pytest.mark.parametrize("length", [0.2, 0.05, 0.02])
+def test_light_that_changes_inside_cells_is_stated(floor, length):
+    """Pools of light down to a third of a cell: stated over true is never below the half that a person is promised."""
+    rng = np.random.default_rng(5)
+    one = np.ones(len(floor.cells))
+
+    def light(points):
+        return (np.sin(2.0 * np.pi * points[:, :2] / length) > 0.7).all(axis=1) * 1.0
+
+    halves = [sample(floor, light, 2, rng) for _ in range(2)]
+    fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
+    fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, one))
+    stated = floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
+    true = squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
+    assert 0.5 < np.sqrt(stated / true) < 1.5
+
+
 def test_light_is_smoothed_where_it_is_smooth(build):
     """Waves on one half of the floor, nothing on the other, noise on both: no single smoothing is as good for both."""
     scene = Scene((build.quad(),), (build.grey,))
@@ -151,9 +168,16 @@ def test_two_witnesses_count_by_what_they_know():
     assert _unresolved(many, np.full(1000, middle), none, each)[:2] == pytest.approx(
         [middle / 2, middle * 1.5], rel=5e-3
     )
-    assert _unresolved(many, np.full(1000, 5 * middle), none, each).mean() == pytest.approx(2.0 / STEP_BEND)
+    fewer = np.full(100, 4 * middle), none[:100], np.full(100, 1e-2)
+    assert _unresolved(many[:100], *fewer).mean() == pytest.approx(2.0 / STEP_BEND)
     assert _unresolved(many, np.full(1000, -middle), none, each).mean() == pytest.approx(2.0 / PARABOLA_BEND)
     assert _unresolved(np.zeros(2), np.ones(2), np.zeros(2), np.ones(2)).tolist() == [0, 0]
+    # Of what samples are sure of, less three deviations, no bend says otherwise, and then it lies where they do.
+    sure = 1.0 - 3.0 / np.sqrt(1000)
+    uneven = np.tile([0.0, 2.0], 500)
+    for bend in (many, -many, none):
+        assert _unresolved(bend, np.full(1000, 5 * middle), none, each) == pytest.approx(5 * middle * sure)
+        assert _unresolved(bend, 5 * middle * uneven, none, each)[::2].max() == 0.0
     # Noise a hundred times as large as what is left of it is not known so well that the samples could tell.
     noisy = _unresolved(many, np.full(1000, 202 * middle), np.full(1000, 200 * middle), each).mean()
     assert middle < noisy < 1.5 * middle
@@ -177,10 +201,10 @@ def test_what_lies_beside_a_break_says_nothing_of_the_rest():
     """Beside a contour samples lie far off; elsewhere they are as near as a smooth fit's."""
     bend, noise, weight = np.ones(200), np.zeros(200), np.full(200, 1 / 200)
     broken = np.repeat([False, True], 100)
-    distance = np.where(broken, 5.0, 1 / 40)
+    distance = np.where(broken, 1 / 5, 1 / 40)
     found = _unresolved_by_kind(broken, bend, distance, noise, weight)
     assert found[:100] == pytest.approx(1 / 40, rel=0.02)
-    assert found[100:] == pytest.approx(5.0)
+    assert found[100:] == pytest.approx(1 / 5)
     assert _unresolved(bend, distance, noise, weight)[:100].mean() > 2 / 40
 
 
