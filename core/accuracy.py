@@ -181,10 +181,10 @@ def cross_validate(
     distance = told[0] - sharpest.spread(fit) / 2.0
     unresolved = _unresolved_by_kind(fit.broken, bend, distance, own_noise, area * shown)
     sampling, smoothed = np.zeros((2, len(area)))
-    for number, smoother_one in enumerate(tried):
+    for number, fitted in enumerate(tried):
         share = (own_level == number).mean(axis=1)
-        sampling += share * smoother_one.spread(fit) / 4.0
-        smoothed += share * smoother_one.smoothed_by(sharpest, fit)
+        sampling += share * fitted.spread(fit) / 4.0
+        smoothed += share * fitted.smoothed_by(sharpest, fit)
     last = _Halves(best[0][:, 0], best[1][:, 0])
     return Fitted(
         alpha=np.array(ALPHAS)[level],
