@@ -235,18 +235,17 @@ def _unresolved_by_kind(broken: Bool, bend: Float64, distance: Float64, noise: F
     unseen = np.zeros_like(bend)
     for kind in (broken, ~broken):
         unseen[kind] = _unresolved(bend[kind], distance[kind], noise[kind], weight[kind])
-    # Nothing bends over a break: what light does beside one that is not straight, only the samples tell.
-    left = _without_negatives((distance - noise)[broken], weight[broken])
-    unseen[broken] = np.maximum(left, unseen[broken])
+    # Nothing bends over a break: what light does beside one that is not straight, only the samples tell. Of a single
+    # cell they tell too little as often as too much, so that is no more in all than what is left in all.
+    left = (distance - noise)[broken]
+    unseen[broken] = np.maximum(_shared_out(float(weight[broken] @ left), left, weight[broken]), unseen[broken])
     return unseen
 
 
-def _without_negatives(left: Float64, weight: Float64) -> Float64:
-    """What is left (n,) when noise is taken away, of which much is noise still, as often below zero as above: where it
-    is above, but no more in all."""
-    above = np.maximum(left, 0.0)
-    in_all = float(weight @ above)
-    return above * (max(float(weight @ left), 0.0) / in_all if in_all > 0.0 else 0.0)
+def _shared_out(in_all: float, where: Float64, weight: Float64) -> Float64:
+    """A weighted sum over cells, if above zero, in proportion to what is above zero of other values (c,)."""
+    above = np.maximum(where, 0.0)
+    return np.asarray(above * (in_all / float(weight @ above))) if in_all > 0.0 else np.zeros_like(above)
 
 
 def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float64) -> Float64:
@@ -266,10 +265,7 @@ def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float6
     spread = np.sqrt(PARABOLA_BEND / STEP_BEND)
     told = float(np.clip(told, guess / spread, guess * spread))
     surely = in_all - _SURE * np.sqrt(doubt)
-    where = np.maximum(bend if surely <= told else left, 0.0)
-    if max(told, surely) <= 0.0:
-        return np.zeros_like(bend)
-    return np.asarray(where * (max(told, surely) / float(weight @ where)))
+    return _shared_out(told, bend, weight) if surely <= told else _shared_out(surely, left, weight)
 
 
 def squared_mean(corners: Float64) -> Float64:

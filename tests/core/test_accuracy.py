@@ -100,35 +100,33 @@ def test_independent_noise_bends_nothing(floor):
     assert abs(area @ fit.bending(first, second)) < 4 * alone / np.sqrt(floor.vertices / 3)
 
 
+def stated_and_true(floor, light, rng, noise=0.0) -> tuple[float, float]:
+    """Mean squared errors of a fit to four samples in each cell: as it is stated, and as it is."""
+    area = floor.cells.area
+    halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
+    fit = Fit(floor, halves[0].lumped, np.zeros(len(area), bool))
+    fitted = fit_halves(fit, halves, cross_validate(fit, halves, area, np.ones(len(area))))
+    stated = area @ (fitted.sampling + fitted.resolution) / area.sum()
+    return stated, squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.05, 0.5])
 def test_the_stated_error_is_the_true_one(floor, noise):
     """A soft front with sampling noise: stated over true within the 0.7 to 1.5 that a person is promised."""
     rng = np.random.default_rng(3)
-    stated = true = 0.0
-    one = np.ones(len(floor.cells))
-    for light in fronts(lambda t: np.clip(t / 0.1, 0, 1)):
-        halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
-        fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
-        fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, one))
-        stated += floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
-        true += squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
+    lights = fronts(lambda t: np.clip(t / 0.1, 0, 1))
+    stated, true = np.sum([stated_and_true(floor, light, rng, noise) for light in lights], axis=0)
     assert 0.7 < np.sqrt(stated / true) < 1.5
 
 
 @pytest.mark.parametrize("length", [0.2, 0.05, 0.02])
 def test_light_that_changes_inside_cells_is_stated(floor, length):
     """Pools of light down to a third of a cell: stated over true is never below the half that a person is promised."""
-    rng = np.random.default_rng(5)
-    one = np.ones(len(floor.cells))
 
     def light(points):
         return (np.sin(2.0 * np.pi * points[:, :2] / length) > 0.7).all(axis=1) * 1.0
 
-    halves = [sample(floor, light, 2, rng) for _ in range(2)]
-    fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
-    fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, one))
-    stated = floor.cells.area @ (fitted.sampling + fitted.resolution) / floor.cells.area.sum()
-    true = squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
+    stated, true = stated_and_true(floor, light, np.random.default_rng(5))
     assert 0.5 < np.sqrt(stated / true) < 1.5
 
 
