@@ -78,6 +78,10 @@ ALPHAS = (0.02, 0.5, 5.0, 50.0)
 _FEW = 0.01
 #: Mean squared jump of the gradient over mean squared error, of the least smooth fit of a step and of a parabola.
 STEP_BEND, PARABOLA_BEND = 6.0, 70.0
+#: Between these all are as likely, until samples tell more; here in steps of two percent.
+_BENDS = np.geomspace(STEP_BEND, PARABOLA_BEND, 129)
+#: How often bends are averaged with those around them.
+_BLURS = 2
 #: Relative error up to which the halves are fitted: they only tell errors that are larger.
 _ROUGH = 2e-3
 #: How many times as bright as its samples' mean a vertex begins at most.
@@ -171,7 +175,7 @@ def cross_validate(
                 break
             level[smoother] = len(tried)
         else:
-            bend = fit.bending(*values)
+            bend = _averaged_around(fit.bending(*values), fit)
         # Only the first and the last are asked for again: large meshes need the room.
         told = [*told[:1], predicted]
         tried.append(_Halves(first, second))
@@ -197,6 +201,13 @@ def cross_validate(
         halves=last,
         tried=_tried(halves),
     )
+
+
+def _averaged_around(values: Float64, fit: Fit) -> Float64:
+    """Values (c,) averaged with those of the cells around: in a single cell noise bends as much as light does."""
+    for _ in range(_BLURS):
+        values = fit.receivers.at_cells(fit.receivers.vertex_means(values))
+    return values
 
 
 def _in_colour(grey: Float64, averages: Float64, to_grey: Float64) -> Float64:
@@ -254,18 +265,22 @@ def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float6
 
     A bend is certain, but whether it means a step, a kink or a curve is not: then the error is a sixth to a seventieth
     of it. What is left is right on average, but a small difference of large numbers, however many there are: the noise
-    is not known any better than _MISJUDGED. Each counts by its variance. Where surely more is left than a step would
-    leave, light changes inside cells, so that halves do not agree how it bends: then only the samples tell.
+    is not known any better than _MISJUDGED. Between them Bayes' rule decides. Where surely more is left than a step
+    would leave, light changes inside cells, so that halves do not agree how it bends: then only the samples tell.
     """
-    guess = max(float(weight @ bend), 0.0) / np.sqrt(STEP_BEND * PARABOLA_BEND)
     left = distance - noise
     doubt = float(np.sum((weight * left) ** 2)) + (_MISJUDGED * float(weight @ noise)) ** 2
-    in_all = float(weight @ left)
-    told = (doubt * guess + guess**2 * in_all) / (doubt + guess**2) if guess > 0.0 else 0.0
-    spread = np.sqrt(PARABOLA_BEND / STEP_BEND)
-    told = float(np.clip(told, guess / spread, guess * spread))
+    in_all, bends = float(weight @ left), max(float(weight @ bend), 0.0)
+    told = _posterior_mean(bends / _BENDS, _BENDS, in_all, doubt)
     surely = in_all - _SURE * np.sqrt(doubt)
     return _shared_out(told, bend, weight) if surely <= told else _shared_out(surely, left, weight)
+
+
+def _posterior_mean(candidates: Float64, prior: Float64, measured: float, variance: float) -> float:
+    """The mean of what may be, (n,) with weights (n,) before, now that it has been measured."""
+    off = (candidates - measured) ** 2 / (2.0 * max(variance, float(np.finfo(float).tiny)))
+    likely = prior * np.exp(off.min() - off)
+    return float(candidates @ likely / likely.sum())
 
 
 def squared_mean(corners: Float64) -> Float64:

@@ -19,7 +19,7 @@ from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
 from .refinement import fit_samples, judge_samples
 from .sampling import stream, subseed
-from .scene import Bool, Float64, Scene
+from .scene import Bool, Scene
 from .splitting import until_allowed
 from .surroundings import GAP, Surroundings
 from .survey import Survey
@@ -33,8 +33,6 @@ _KEPT = 0.25
 #: share of the squared error of the worst cell that is not split: a cut makes half as many cells as a split and leaves
 #: less error, and a contour in tatters is worse to see than coarse cells. A cut for all is worse again, and so is six.
 _CUT = 0.25
-#: How often errors that are mostly noise are averaged with those around them.
-_BLURS = 2
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
 
@@ -98,10 +96,7 @@ class Bends:
         nobody need look again; and the largest squared error of those for which there is no room."""
         found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
         # What smoothing takes for want of samples, smaller triangles do not bring back.
-        direct, *indirect = (fitted.unresolved for fitted in found.fits)
-        # What a cell's own samples say of its indirect light is mostly noise, and it would be chosen for that.
-        blurred = [_blurred(error, survey.receivers) for error in indirect]
-        pieces = found.area * found.shown * sum(blurred, direct)
+        pieces = found.area * found.shown * sum(fitted.unresolved for fitted in found.fits)
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
@@ -130,10 +125,3 @@ class Bends:
         bounds, closed = (looks.covered(*where, reach * points.size) for reach in (GAP, GAP / 2**BEND_ROUNDS))
         self.rays["contact"] += 3 * len(hidden)
         return hidden[bounds & ~closed & ~looks.inside(*where)]
-
-
-def _blurred(error: Float64, receivers: Receivers) -> Float64:
-    """Errors (c,) averaged with those of the cells around."""
-    for _ in range(_BLURS):
-        error = receivers.at_cells(receivers.vertex_means(error))
-    return error
