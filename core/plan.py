@@ -65,6 +65,8 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 8_000, 1.75
+#: How many times as many where shadows are not cut, for too many lights cast them: then triangles make up for that.
+_UNCUT = 4.0
 #: Where they are fewer than one in so many of the first cells, one round more finds them all: typical as well.
 _FEW_CALLED = 5.0
 #: Cells that triangles which are kept gain at most where light breaks, for each cell.
@@ -231,7 +233,6 @@ class _Prices:
         self._unpriced = chosen
         self._settings = settings
         self._machine = machine
-        self._pieces = len(emitting_pieces(scene))
         self._own = sum(len(o.triangles) for o in scene.objects)
         self._cells: dict[int, int] = {}
 
@@ -269,7 +270,8 @@ class _Prices:
     def _called_by_light(self, effort: Effort) -> float:
         """The same if no triangle of the receivers' own were so small already."""
         straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
-        return float(min(_CALLED * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
+        called = _CALLED * (_UNCUT if sum(self._lights.values()) > MOST_CONTOURED else 1.0)
+        return float(min(called * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
 
     def _rounds(self, effort: Effort) -> float:
         """Of finding where light bends: one sees that nothing is coarse, if so."""
@@ -282,6 +284,17 @@ class _Prices:
         """Share of the receivers' surface in triangles of their own that are larger than so many equal ones would be:
         only these are split."""
         return float(self._own_areas[self._own_areas * cells > 1.0].sum())
+
+    @cached_property
+    def _lights(self) -> dict[str, int]:
+        """How many there are of each kind, those to choose from as many as they cost."""
+        planned, scene = self._unpriced, self._unpriced.scene
+        lights = {name: sum(isinstance(lamp, kind) for lamp in scene.lamps) for name, kind in LAMPS.items()}
+        lights["sky lights"] = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
+        lights["portals"] = len(scene.portals) if planned.active("portals") else 0
+        chosen_from = planned.active("emitting surfaces") and not planned.effort.emitters_by_rays
+        lights["emitting surfaces"] = len(emitting_pieces(scene)) or _TREE_COST * chosen_from
+        return lights
 
     @cached_property
     def _own_areas(self) -> Float64:
@@ -302,28 +315,19 @@ class _Prices:
 
     def _works(self, planned: Plan) -> dict[str, Work]:
         """What each effect calls for, and what serves them all (REST)."""
-        effort, scene = planned.effort, planned.scene
+        effort = planned.effort
         cells = self._adapted(planned)
         passes = self._passes(effort, cells)
         surveyed = self._surveyed(effort)
         patches = _MORE_PATCHES * effort.patches if planned.looks_around else 0.0
-        pieces = self._pieces
-        if planned.active("emitting surfaces") and not pieces and not effort.emitters_by_rays:
-            pieces = _TREE_COST
-        suns = len(split_bright(scene.sky)[1]) if planned.active("sky lights") else 0
-        windows = len(scene.portals) if planned.active("portals") else 0
-        count = len(scene.lamps) + pieces + suns + windows
+        count = sum(self._lights.values())
         asked = effort.lights / count if count > MOST_ASKED else 1.0
         crossed = (1.0 - (1.0 - _CROSSED) ** count) * min(_UNCERTAIN / effort.error, 1.0) ** 2
         points = cells * (passes + effort.boundary_passes * crossed)
         if surveyed and count <= MOST_CONTOURED:
             points += _CONTOUR_POINTS * cells
         per_light = asked * effort.shadow_rays * (points + surveyed + 8 * patches)
-        lights = {name: sum(isinstance(lamp, kind) for lamp in scene.lamps) for name, kind in LAMPS.items()}
-        lights |= {"sky lights": suns, "portals": windows}
-        works = {name: Work(shadow=per_light * count) for name, count in lights.items() if count}
-        if pieces:
-            works["emitting surfaces"] = Work(shadow=per_light * pieces)
+        works = {name: Work(shadow=per_light * number) for name, number in self._lights.items() if number}
         if planned.looks_around:
             looks = passes * (1.0 + hiding(self._settings.tessellate, effort.error))
             # One look serves all that it may meet: it counts for the first of them.

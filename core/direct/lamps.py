@@ -101,7 +101,8 @@ def _column(vectors: Float64) -> Float64:
 def _spread(towards: Float32, depth: Float32, scale: Float32 | float) -> Ways:
     """Ways to places spread evenly over a flat lamp. depth (r, n): of the lamp along them; scale: its area."""
     inverse = 1 / np.sqrt(np.maximum((towards * towards).sum(axis=0), np.float32(1e-30)))
-    return Ways(towards, inverse, depth * inverse**3 * np.float32(scale))
+    # The cosine first: where a receiver touches the lamp, a third power would be infinite, and that times no depth.
+    return Ways(towards, inverse, depth * inverse * inverse**2 * np.float32(scale))
 
 
 def frame(axis: Float32) -> tuple[Float32, Float32]:

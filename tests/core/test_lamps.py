@@ -35,6 +35,15 @@ def times(factor) -> np.ndarray:
     return pytest.approx(factor * np.array(COLOR), rel=1e-9)
 
 
+def test_a_receiver_may_touch_a_lamp():
+    """At its very place there is no direction to it, but how much light there is stays a number."""
+    lamp = place(PointLamp("lamp", (1.0, 2.0, 3.0), COLOR), SPACE)
+    here = SPACE.normalise(np.array([lamp.position * SPACE.metres + SPACE.center])).T.astype(np.float32)
+    with np.errstate(all="raise"):
+        ways = lamp.aim(here, np.zeros((2, 1, 1), dtype=np.float32))
+    assert np.isfinite(ways.solid).all()
+
+
 @pytest.mark.parametrize(("point", "distance"), [((0, 0, 0), 5.0), ((3, 0, 1), 5.0)])
 def test_a_point_lamp_obeys_the_inverse_square_and_the_cosine(point, distance):
     lamp = PointLamp("lamp", (0, 0, 5), COLOR)
