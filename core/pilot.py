@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .patches import Patches, PatchMeshes, Space, make_patches, split_objects, unit_space
+from .patches import Patches, PatchMeshes, Space, make_patches, split_objects, triangle_geometry, unit_space
 from .sampling import cosine_patterns, frames, stream
 from .scene import Bool, Float32, Float64, Int32, Scene
 from .tessellation import Int64
@@ -67,14 +67,23 @@ class Pilot:
         origins = np.repeat(offset_along(points, normals), rays, axis=0)
         return Look(origins, directions, self.visibility.follow(origins, directions, rng))
 
-    def on_receivers(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64]:
-        """Points (n, 3) spread at random over the receivers, and the normals (n, 3) there."""
+    @cached_property
+    def _receivers(self) -> tuple[Float64, Float64, Float64]:
+        """Corners (t, 3, 3) of the receivers' triangles, their unit normals and areas."""
         corners = np.concatenate([o.vertices[o.triangles] for o in self.scene.receivers()])
         corners = self.patches.space.normalise(corners)
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        double_area = np.linalg.norm(normals, axis=1)
-        chosen = rng.choice(len(corners), size=count, p=double_area / double_area.sum())
-        return _somewhere_in(corners[chosen], rng), normals[chosen] / double_area[chosen, None]
+        return corners, *triangle_geometry(corners)
+
+    @property
+    def receiving_area(self) -> float:
+        """Of all receivers, in the unit box."""
+        return float(self._receivers[2].sum())
+
+    def on_receivers(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64]:
+        """Points (n, 3) spread at random over the receivers, and the normals (n, 3) there."""
+        corners, normals, area = self._receivers
+        chosen = rng.choice(len(corners), size=count, p=area / area.sum())
+        return _somewhere_in(corners[chosen], rng), normals[chosen]
 
     def where_hit(self, path: Path, rng: np.random.Generator) -> tuple[Float64, Float64]:
         """A point of each triangle that was hit, and its normal on that side; of rays that hit something."""

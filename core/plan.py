@@ -65,11 +65,12 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 8_000, 1.75
-#: How many times as many where shadows are not cut, for too many lights cast them: then triangles make up for that.
-_UNCUT = 4.0
+#: Cells that there are in all where pools of light call for more, for each unit of roughness and of light that has not
+#: bounced, over the error: typical of a hall, and of rooms, with 12 to 40 lamps.
+_POOLS = 4.7
 #: Where they are fewer than one in so many of the first cells, one round more finds them all: typical as well.
 _FEW_CALLED = 5.0
-#: Cells that triangles which are kept gain at most where light breaks, for each cell.
+#: Cells that triangles which are kept gain at most where light breaks, for each cell, and others before they are split.
 _MOST_CROSSED = 0.25
 #: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
 #: is less of the whole.
@@ -258,7 +259,8 @@ class _Prices:
         asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            return self._coarse(effort) + self._called(effort)
+            cut = _MOST_CROSSED if sum(self._lights.values()) <= MOST_CONTOURED else 0.0
+            return (1.0 + cut) * self._coarse(effort) + self._called(effort)
         crossed = 0.01 / effort.error if self._settings.tessellate else min(0.01 / effort.error, _MOST_CROSSED)
         return planned.cells + min(crossed * planned.cells, effort.growth * effort.triangles)
 
@@ -269,9 +271,10 @@ class _Prices:
 
     def _called_by_light(self, effort: Effort) -> float:
         """The same if no triangle of the receivers' own were so small already."""
-        straight = min((1.0 - self._machine.reflected) / _TYPICAL_DIRECT, 1.0)
-        called = _CALLED * (_UNCUT if sum(self._lights.values()) > MOST_CONTOURED else 1.0)
-        return float(min(called * (0.02 * straight / effort.error) ** _CALLED_POWER, effort.triangles))
+        straight = 1.0 - self._machine.reflected
+        shadows = _CALLED * (0.02 * min(straight / _TYPICAL_DIRECT, 1.0) / effort.error) ** _CALLED_POWER
+        pools = _POOLS * self._machine.roughness * straight / effort.error - self._coarse(effort)
+        return float(min(max(shadows, pools), effort.triangles))
 
     def _rounds(self, effort: Effort) -> float:
         """Of finding where light bends: one sees that nothing is coarse, if so."""

@@ -238,6 +238,17 @@ def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):
     assert seconds[0.0] == seconds[0.5] > seconds[0.75] > seconds[0.95]
 
 
+def test_pools_of_light_call_for_more_cells(build, monkeypatch):
+    """Where they call for more than shadows do, and the less so the more light has bounced."""
+    room, seconds = build.furnished_room(), {}
+    for roughness, reflected in ((0.0, 0.5), (10.0, 0.5), (1000.0, 0.5), (1000.0, 0.75), (1e9, 0.5), (1e10, 0.5)):
+        machine = Machine(3e-7, 1e-8, 1.0, 1, reflected=reflected, roughness=roughness)
+        monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_, machine=machine: machine)
+        seconds[roughness, reflected] = plan(room, Settings(error=0.05, triangles=50_000)).seconds
+    assert seconds[0.0, 0.5] == seconds[10.0, 0.5] < seconds[1000.0, 0.75] < seconds[1000.0, 0.5] < seconds[1e9, 0.5]
+    assert seconds[1e9, 0.5] == seconds[1e10, 0.5]
+
+
 def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, monkeypatch):
     calls = []
     monkeypatch.setattr(
