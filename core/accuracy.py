@@ -278,7 +278,9 @@ def _unresolved(bend: Float64, distance: Float64, noise: Float64, weight: Float6
 
 def _posterior_mean(candidates: Float64, prior: Float64, measured: float, variance: float) -> float:
     """The mean of what may be, (n,) with weights (n,) before, now that it has been measured."""
-    off = (candidates - measured) ** 2 / (2.0 * max(variance, float(np.finfo(float).tiny)))
+    # What is measured without doubt is still told apart in steps only.
+    sure = (1e-6 * float(candidates.max())) ** 2
+    off = (candidates - measured) ** 2 / (2.0 * max(variance, sure, float(np.finfo(float).tiny)))
     likely = prior * np.exp(off.min() - off)
     return float(candidates @ likely / likely.sum())
 

@@ -15,11 +15,9 @@ from time import perf_counter
 
 import numpy as np
 
-from .effects import mean_of_sky
 from .parallel import Workers, thread_count
 from .pilot import Pilot
 from .progress import Progress
-from .roughness import roughness
 from .sampling import stream
 from .scene import SceneError
 
@@ -70,8 +68,7 @@ class Machine:
     """How fast this machine is on one scene. ray: seconds that all threads together need for one; number: seconds that
     one thread needs to look one up and add it to a sum, as the rows of a sparse matrix do, which no processor has quick
     instructions for that another lacks; closed: share of the rays that meet something; onward: that go on from there;
-    reflected: mean over the rays of the albedo of what they meet, which is the share of all light that has bounced;
-    roughness: of the straight light, as `roughness` has it."""
+    reflected: mean over the rays of the albedo of what they meet, which is the share of all light that has bounced."""
 
     ray: float
     number: float
@@ -79,7 +76,6 @@ class Machine:
     threads: int
     onward: float = 0.0
     reflected: float = 0.0
-    roughness: float = 0.0
 
     def seconds(self, work: Work) -> float:
         looks, factors = work.gather + work.shadow, work.transport * self.closed
@@ -117,8 +113,7 @@ def calibrate(pilot: Pilot, threads: int) -> Machine:
     met = np.mean(hit >= 0)
     reflected = np.where(hit >= 0, patches.albedo.mean(axis=1)[patches.patch[hit]], 0.0).mean()
     ray, number = traced / (threads * _CALIBRATION), ordered / _CALIBRATION
-    rough = roughness(pilot, np.pi * mean_of_sky(pilot.scene) * (1.0 - float(met)))
-    return Machine(ray, number, float(met), threads, float(onward), float(reflected), rough)
+    return Machine(ray, number, float(met), threads, float(onward), float(reflected))
 
 
 def _fastest(work: Callable[[], object], times: int) -> float:

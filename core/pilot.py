@@ -39,8 +39,12 @@ class Pilot:
         return split_objects(self.scene.surroundings(), _PATCHES)
 
     @cached_property
+    def space(self) -> Space:
+        return unit_space(self.scene)
+
+    @cached_property
     def patches(self) -> Patches:
-        return make_patches(self.scene.surroundings(), unit_space(self.scene), self._split)
+        return make_patches(self.scene.surroundings(), self.space, self._split)
 
     @cached_property
     def visibility(self) -> Visibility:
@@ -71,7 +75,7 @@ class Pilot:
     def _receivers(self) -> tuple[Float64, Float64, Float64]:
         """Corners (t, 3, 3) of the receivers' triangles, their unit normals and areas."""
         corners = np.concatenate([o.vertices[o.triangles] for o in self.scene.receivers()])
-        corners = self.patches.space.normalise(corners)
+        corners = self.space.normalise(corners)
         return corners, *triangle_geometry(corners)
 
     @property

@@ -26,10 +26,11 @@ from .openings import find_openings
 from .patches import triangle_geometry
 from .pilot import Pilot, look_for_sky
 from .result import Effect
-from .scene import Float64, Scene
+from .scene import Float64, Scene, SunLamp
 from .settings import Settings, asked_error
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
+from .unevenness import unevenness
 
 #: Effects that need rays over the hemisphere.
 LOOKING = ("bounces", "sky")
@@ -65,13 +66,14 @@ _INSIDE, _SHOWS = 0.1, 0.1
 #: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
 #: those scenes.
 _CALLED, _CALLED_POWER = 8_000, 1.75
-#: Cells that there are in all where pools of light call for more, for each unit of roughness and of light that has not
+#: Cells that there are in all where pools of light call for more, for each unit of unevenness and of light that has not
 #: bounced, over the error: typical of a hall, and of rooms, with 12 to 40 lamps.
 _POOLS = 4.7
 #: Where they are fewer than one in so many of the first cells, one round more finds them all: typical as well.
 _FEW_CALLED = 5.0
-#: Cells that triangles which are kept gain at most where light breaks, for each cell, and others before they are split.
-_MOST_CROSSED = 0.25
+#: Cells that triangles which are kept gain at most where light breaks, for each cell; and those that others gain where
+#: contours cut them, for each that they start from: typical.
+_MOST_CROSSED, _CUT = 0.25, 0.25
 #: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
 #: is less of the whole.
 _TYPICAL_DIRECT = 0.5
@@ -255,12 +257,11 @@ class _Prices:
         return self._cells[triangles]
 
     def _adapted(self, planned: Plan) -> float:
-        """Cells after adaptation: where they are put where light calls for them, those it starts from and what the
-        asked error calls for; else those there are, and more along its boundaries."""
+        """Cells after adaptation: where they are put where light calls for them, those it starts from, once they are
+        cut, and what the asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            cut = _MOST_CROSSED if sum(self._lights.values()) <= MOST_CONTOURED else 0.0
-            return (1.0 + cut) * self._coarse(effort) + self._called(effort)
+            return (1.0 + _CUT) * self._coarse(effort) + self._called(effort)
         crossed = 0.01 / effort.error if self._settings.tessellate else min(0.01 / effort.error, _MOST_CROSSED)
         return planned.cells + min(crossed * planned.cells, effort.growth * effort.triangles)
 
@@ -273,7 +274,7 @@ class _Prices:
         """The same if no triangle of the receivers' own were so small already."""
         straight = 1.0 - self._machine.reflected
         shadows = _CALLED * (0.02 * min(straight / _TYPICAL_DIRECT, 1.0) / effort.error) ** _CALLED_POWER
-        pools = _POOLS * self._machine.roughness * straight / effort.error - self._coarse(effort)
+        pools = _POOLS * self._unevenness * straight / effort.error - self._coarse(effort)
         return float(min(max(shadows, pools), effort.triangles))
 
     def _rounds(self, effort: Effort) -> float:
@@ -298,6 +299,14 @@ class _Prices:
         chosen_from = planned.active("emitting surfaces") and not planned.effort.emitters_by_rays
         lights["emitting surfaces"] = len(emitting_pieces(scene)) or _TREE_COST * chosen_from
         return lights
+
+    @cached_property
+    def _unevenness(self) -> float:
+        """Of the lamps' light, beside that of emitting surfaces and what the sky and suns bring where it is open."""
+        scene = self._unpriced.scene
+        suns = sum(float(np.mean(lamp.irradiance)) for lamp in scene.lamps if isinstance(lamp, SunLamp))
+        open_air = (1.0 - self._machine.closed) * (np.pi * mean_of_sky(scene) + suns)
+        return unevenness(Pilot(scene), open_air + power_by_area(replace(scene, lamps=())))
 
     @cached_property
     def _own_areas(self) -> Float64:

@@ -154,7 +154,7 @@ def test_light_is_smoothed_where_it_is_smooth(build):
 
 
 def test_noise_is_no_reason_to_split(build):
-    """Waves on one half of the floor, noise on the other: with the cells around, its bends of either sign cancel."""
+    """Waves on one half of the floor, noise on both: with the cells around, its bends of either sign cancel."""
     scene = Scene((build.quad(),), (build.grey,))
     floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
     rng = np.random.default_rng(7)

@@ -156,9 +156,9 @@ def test_what_stands_on_the_floor_is_dark_beneath_and_not_beside(seed):
         np.maximum(-0.33 - grid[:, 0], grid[:, 0] - 0.42), np.maximum(-0.21 - grid[:, 1], grid[:, 1] - 0.37)
     )
     values, cell = shown(baked, grid), 2 / np.sqrt(2000 / 16 / 2)
-    # Half of the sky is open everywhere beside the box, and none beneath it. 5 % of the light is asked for, which is
-    # 0.5 in the open: the darkest point may be off by one and a half times as much.
-    assert values[depth > 0].min() > 0.25 - 1.5 * 0.05 * 0.5
+    # Half of the sky is open everywhere beside the box, and none beneath it. In sixteen bakes, which are asked for 5 %,
+    # the darkest points have 0.90 to 1.00 of it, 0.96 +- 0.03 in the mean.
+    assert values[depth > 0].min() > 0.85 * 0.25
     # A straight cut takes off a corner of the box: halfway between two cuts, at most, of a cell that was split once.
     corners = np.array([[x, y] for x in (-0.33, 0.42) for y in (-0.21, 0.37)])
     beside_corner = np.linalg.norm(grid[:, None] - corners, axis=2).min(axis=1) < cell / 2

@@ -12,7 +12,7 @@ from radiosity_baker.core.bake import bake
 from radiosity_baker.core.contours import Contours
 from radiosity_baker.core.cost import Machine
 from radiosity_baker.core.effects import MOST_PANELS
-from radiosity_baker.core.patches import unit_space
+from radiosity_baker.core.patches import triangle_geometry, unit_space
 from radiosity_baker.core.pilot import Pilot
 from radiosity_baker.core.plan import (
     LOOKING,
@@ -241,12 +241,32 @@ def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):
 def test_pools_of_light_call_for_more_cells(build, monkeypatch):
     """Where they call for more than shadows do, and the less so the more light has bounced."""
     room, seconds = build.furnished_room(), {}
-    for roughness, reflected in ((0.0, 0.5), (10.0, 0.5), (1000.0, 0.5), (1000.0, 0.75), (1e9, 0.5), (1e10, 0.5)):
-        machine = Machine(3e-7, 1e-8, 1.0, 1, reflected=reflected, roughness=roughness)
+    for uneven, reflected in ((0.0, 0.5), (10.0, 0.5), (1000.0, 0.5), (1000.0, 0.75), (1e9, 0.5), (1e10, 0.5)):
+        machine = Machine(3e-7, 1e-8, 1.0, 1, reflected=reflected)
         monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_, machine=machine: machine)
-        seconds[roughness, reflected] = plan(room, Settings(error=0.05, triangles=50_000)).seconds
+        monkeypatch.setattr("radiosity_baker.core.plan.unevenness", lambda *_, uneven=uneven: uneven)
+        seconds[uneven, reflected] = plan(room, Settings(error=0.05, triangles=50_000)).seconds
     assert seconds[0.0, 0.5] == seconds[10.0, 0.5] < seconds[1000.0, 0.75] < seconds[1000.0, 0.5] < seconds[1e9, 0.5]
     assert seconds[1e9, 0.5] == seconds[1e10, 0.5]
+
+
+def test_pools_count_beside_all_other_light(build, monkeypatch):
+    """As much as comes from emitting surfaces, and from the sky and suns where rays leave: half of them do."""
+    told = []
+    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 1e-8, 0.5, 1))
+    monkeypatch.setattr("radiosity_baker.core.plan.unevenness", lambda _, other: told.append(other) or 0.0)
+    lamp, sun = PointLamp("lamp", (0, 0, 1), (1.0,) * 3), SunLamp("sun", (0, 0, -1), (2.0,) * 3)
+    shining = replace(build.grey, emission=(3.0,) * 3)
+    panel = replace(build.quad("panel", (-0.5, -0.5, 2), (0, 1, 0), (1, 0, 0)), surface=np.ones(2, dtype=np.int32))
+    ground = build.quad()
+    for scene in (
+        Scene((ground,), (build.grey,), (lamp,)),
+        Scene((ground,), (build.grey,), (lamp, sun), sky=(0.5,) * 3),
+        Scene((ground, panel), (build.grey, shining), (lamp,)),
+    ):
+        plan(scene, Settings(error=0.02))
+    area = [float(triangle_geometry(o.vertices[o.triangles])[1].sum()) for o in (ground, panel)]
+    assert told == pytest.approx([0.0, 0.5 * (0.5 * np.pi + 2.0), 3.0 * np.pi * area[1] / sum(area)])
 
 
 def test_a_smaller_error_costs_more_and_one_calibration_prices_them_all(build, monkeypatch):
