@@ -79,9 +79,9 @@ class Pilot:
         return corners, *triangle_geometry(corners)
 
     @property
-    def receiving_area(self) -> float:
-        """Of all receivers, in the unit box."""
-        return float(self._receivers[2].sum())
+    def receiving_areas(self) -> Float64:
+        """Of the receivers' triangles (t,), in the unit box."""
+        return self._receivers[2]
 
     def on_receivers(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64]:
         """Points (n, 3) spread at random over the receivers, and the normals (n, 3) there."""

@@ -23,7 +23,6 @@ from .effects import (
     sky_lights,
 )
 from .openings import find_openings
-from .patches import triangle_geometry
 from .pilot import Pilot, look_for_sky
 from .result import Effect
 from .scene import Float64, Scene, SunLamp
@@ -232,11 +231,11 @@ class _Prices:
     """Plans of one scene by effort."""
 
     def __init__(self, chosen: Plan, settings: Settings, machine: Machine) -> None:
-        scene = chosen.scene
         self._unpriced = chosen
+        self._pilot = Pilot(chosen.scene)
         self._settings = settings
         self._machine = machine
-        self._own = sum(len(o.triangles) for o in scene.objects)
+        self._own = sum(len(o.triangles) for o in chosen.scene.objects)
         self._cells: dict[int, int] = {}
 
     def of(self, effort: Effort) -> Plan:
@@ -306,14 +305,13 @@ class _Prices:
         scene = self._unpriced.scene
         suns = sum(float(np.mean(lamp.irradiance)) for lamp in scene.lamps if isinstance(lamp, SunLamp))
         open_air = (1.0 - self._machine.closed) * (np.pi * mean_of_sky(scene) + suns)
-        return unevenness(Pilot(scene), open_air + power_by_area(replace(scene, lamps=())))
+        return unevenness(self._pilot, open_air + power_by_area(replace(scene, lamps=())))
 
     @cached_property
     def _own_areas(self) -> Float64:
         """Of the receivers' own triangles, as shares of all."""
-        receivers = self._unpriced.scene.receivers()
-        area = np.concatenate([triangle_geometry(o.vertices[o.triangles])[1] for o in receivers])
-        return np.asarray(area / max(float(area.sum()), np.finfo(float).tiny))
+        area = self._pilot.receiving_areas
+        return np.asarray(area / max(float(area.sum()), float(np.finfo(float).tiny)))
 
     def _coarse(self, effort: Effort) -> int:
         return self._count(max(int(effort.triangles / effort.coarsest), 1))

@@ -27,17 +27,17 @@ def unevenness(pilot: Pilot, other: float) -> float:
     D2 L is taken along one direction at random at each of a thousand points, on triangles as flat as they are.
     """
     lights = [place(lamp, pilot.space) for lamp in pilot.scene.lamps if not isinstance(lamp, SunLamp)]
-    if not lights or pilot.receiving_area == 0.0:
+    area = float(pilot.receiving_areas.sum())
+    if not lights or area == 0.0:
         return 0.0
     rng = stream(0, "unevenness")
     points, normals = pilot.on_receivers(int(np.clip(_TOGETHER // len(lights), _FEWEST, _MOST)), rng)
     along = np.cross(normals, rng.standard_normal(normals.shape))
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), np.finfo(float).tiny)
-    step = np.sqrt(pilot.receiving_area / _CELLS / 2.0) * along
+    step = np.sqrt(area / _CELLS / 2.0) * along
     three, facing = np.concatenate([points - step, points, points + step]), np.tile(normals, (3, 1))
-    before, here, after = np.split(
-        sum((_irradiance(light, three, facing) for light in lights), np.zeros(len(three))), 3
-    )
+    total = np.sum([_irradiance(light, three, facing) for light in lights], axis=0)
+    before, here, after = np.split(total, 3)
     bends, mean = np.abs(before + after - 2.0 * here), float(here.mean())
     return _CELLS * float(np.mean(bends ** (2 / 3))) ** 1.5 / (mean + other) if mean > 0.0 else 0.0
 

@@ -35,6 +35,16 @@ def floor(build):
     return make_receivers(scene, unit_space(scene), Settings(), 800)
 
 
+@pytest.fixture(scope="module")
+def finer_floor(build):
+    scene = Scene((build.quad(),), (build.grey,))
+    return make_receivers(scene, unit_space(scene), Settings(), 3000)
+
+
+def waves_on_one_half(points, height):
+    return 1.0 + height * np.sin(12.0 * np.pi * np.minimum(points[:, 0], 0.0))
+
+
 def sample(receivers, light, passes, rng, noise=0.0) -> Samples:
     """One channel, with normal noise of a known deviation."""
     cells, count = receivers.cells, len(receivers.cells)
@@ -45,6 +55,12 @@ def sample(receivers, light, passes, rng, noise=0.0) -> Samples:
         values = light(points) + noise * rng.standard_normal(count)
         samples.add(slice(None), weights, values[:, None], np.full(count, noise**2), np.ones(count, bool))
     return samples
+
+
+def sampled_twice(receivers, light, rng, noise=0.0) -> tuple[list[Samples], Fit]:
+    """Two halves of four samples in each cell, and what they are fitted with."""
+    halves = [sample(receivers, light, 2, rng, noise) for _ in range(2)]
+    return halves, Fit(receivers, halves[0].lumped, np.zeros(len(receivers.cells), bool))
 
 
 def squared_error(receivers, light, corners, rng) -> float:
@@ -91,8 +107,7 @@ def test_the_error_of_a_fit_is_a_known_share_of_its_bends(floor, profile, low, h
 def test_independent_noise_bends_nothing(floor):
     """The product of n independent bends of either sign is 1/sqrt(n) of their squares; here within four deviations."""
     rng = np.random.default_rng(2)
-    halves = [sample(floor, lambda points: np.ones(len(points)), 2, rng, noise=1.0) for _ in range(2)]
-    fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
+    halves, fit = sampled_twice(floor, lambda points: np.ones(len(points)), rng, noise=1.0)
     first, second = (fit.solve(fit.system(half), ALPHAS[0]) for half in halves)
     area = floor.cells.area
     alone = area @ fit.bending(first, first)
@@ -103,8 +118,7 @@ def test_independent_noise_bends_nothing(floor):
 def stated_and_true(floor, light, rng, noise=0.0) -> tuple[float, float]:
     """Mean squared errors of a fit to four samples in each cell: as it is stated, and as it is."""
     area = floor.cells.area
-    halves = [sample(floor, light, 2, rng, noise) for _ in range(2)]
-    fit = Fit(floor, halves[0].lumped, np.zeros(len(area), bool))
+    halves, fit = sampled_twice(floor, light, rng, noise)
     fitted = fit_halves(fit, halves, cross_validate(fit, halves, area, np.ones(len(area))))
     stated = area @ (fitted.sampling + fitted.resolution) / area.sum()
     return stated, squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
@@ -130,17 +144,14 @@ def test_light_that_changes_inside_cells_is_stated(floor, length):
     assert 0.5 < np.sqrt(stated / true) < 1.5
 
 
-def test_light_is_smoothed_where_it_is_smooth(build):
+def test_light_is_smoothed_where_it_is_smooth(finer_floor):
     """Waves on one half of the floor, nothing on the other, noise on both: no single smoothing is as good for both."""
-    scene = Scene((build.quad(),), (build.grey,))
-    floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
-    rng, everywhere = np.random.default_rng(4), np.zeros(len(floor.cells), bool)
+    floor, rng = finer_floor, np.random.default_rng(4)
 
     def light(points):
-        return 1.0 + 0.5 * np.sin(12.0 * np.pi * np.minimum(points[:, 0], 0.0))
+        return waves_on_one_half(points, 0.5)
 
-    halves = [sample(floor, light, 2, rng, noise=0.2) for _ in range(2)]
-    fit = Fit(floor, halves[0].lumped, everywhere)
+    halves, fit = sampled_twice(floor, light, rng, noise=0.2)
     fitted = fit_halves(fit, halves, cross_validate(fit, halves, floor.cells.area, np.ones(len(floor.cells))))
     place = np.zeros(floor.vertices)
     place[floor.corner_vertex] = floor.element_corners[..., 0]
@@ -153,17 +164,14 @@ def test_light_is_smoothed_where_it_is_smooth(build):
     assert errors[0] < 0.8 * min(errors[1:])
 
 
-def test_noise_is_no_reason_to_split(build):
+def test_noise_is_no_reason_to_split(finer_floor):
     """Waves on one half of the floor, noise on both: with the cells around, its bends of either sign cancel."""
-    scene = Scene((build.quad(),), (build.grey,))
-    floor = make_receivers(scene, unit_space(scene), Settings(), 3000)
-    rng = np.random.default_rng(7)
+    floor, rng = finer_floor, np.random.default_rng(7)
 
     def light(points):
-        return 1.0 + 0.3 * np.sin(12.0 * np.pi * np.minimum(points[:, 0], 0.0))
+        return waves_on_one_half(points, 0.3)
 
-    halves = [sample(floor, light, 2, rng, noise=0.2) for _ in range(2)]
-    fit = Fit(floor, halves[0].lumped, np.zeros(len(floor.cells), bool))
+    halves, fit = sampled_twice(floor, light, rng, noise=0.2)
     judged = cross_validate(fit, halves, floor.cells.area, np.ones(len(floor.cells)))
     flat = floor.cells.corners[..., 0].min(axis=1) > 0.0
     share = judged.unresolved * floor.cells.area

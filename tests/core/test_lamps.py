@@ -38,9 +38,8 @@ def times(factor) -> np.ndarray:
 def test_a_receiver_may_touch_a_lamp():
     """At its very place there is no direction to it, but how much light there is stays a number."""
     lamp = place(PointLamp("lamp", (1.0, 2.0, 3.0), COLOR), SPACE)
-    here = SPACE.normalise(np.array([lamp.position * SPACE.metres + SPACE.center])).T.astype(np.float32)
     with np.errstate(all="raise"):
-        ways = lamp.aim(here, np.zeros((2, 1, 1), dtype=np.float32))
+        ways = lamp.aim(lamp.position[:, None].astype(np.float32), np.zeros((2, 1, 1), dtype=np.float32))
     assert np.isfinite(ways.solid).all()
 
 
