@@ -22,6 +22,7 @@ from .effects import (
     sky,
     sky_lights,
 )
+from .form_factors.sides import SITES
 from .openings import find_openings
 from .pilot import Pilot, look_for_sky
 from .result import Effect
@@ -336,7 +337,8 @@ class _Prices:
         points = cells * (passes + effort.boundary_passes * crossed)
         if surveyed and count <= MOST_CONTOURED:
             points += _CONTOUR_POINTS * cells
-        per_light = asked * effort.shadow_rays * (points + surveyed + 8 * patches)
+        on_sides = 2 * SITES * patches * shadow_rays_of_site(effort)
+        per_light = asked * (effort.shadow_rays * (points + surveyed) + on_sides)
         works = {name: Work(shadow=per_light * number) for name, number in self._lights.items() if number}
         if planned.looks_around:
             looks = passes * (1.0 + hiding(self._settings.tessellate, effort.error))
@@ -371,12 +373,17 @@ class _Prices:
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
 
 
+def shadow_rays_of_site(effort: Effort) -> int:
+    """From each of the points of a patch to a lamp: what one misses the others of the same patch find."""
+    return max(effort.shadow_rays // SITES, 1)
+
+
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = asked_error(settings)
     finer = min(max(0.02 / asked, 0.1), 4.0)
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
-    patches = int(4096 * finer) if estimator == "hemisphere" else int(1500 * finer)
+    patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
     may_add = settings.error is not None and settings.seconds is None and asked < _ROUGH
     # Where light bends is no guide to where a texture has its detail.
     textured = any(varies(scene, o) for o in scene.receivers())
@@ -388,7 +395,8 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         estimator=estimator,
         patches=patches,
         most_patches=settings.triangles if estimator == "hemisphere" and may_add else 0,
-        transport_rays=64,
+        # Few rays whose tints are over one, as others' are under it, are no average.
+        transport_rays=64 if goes_on(scene) else 32,
         shadow_rays=4,
         lights=max(int(MOST_ASKED * min(0.02 / asked, 1.0)), _FEWEST_LIGHTS),
         gather_rays=gather_rays(asked, sum(len(o.triangles) for o in scene.receivers())),

@@ -14,7 +14,7 @@ from radiosity_baker.core.patch_count import patches_wanted, transport_error
 from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.settings import Settings
 
-ASKED = Settings(triangles=20_000, error=0.02)
+ASKED = Settings(triangles=40_000, error=0.02)
 
 
 @pytest.fixture
@@ -34,26 +34,27 @@ def test_they_bring_the_error_under_half_of_what_is_asked(build, left):
         left(error)
         assert wanted(scene) == int(times * usual)
     left(0.5)
-    assert wanted(scene) == 20_000, "there are no more than triangles"
+    assert wanted(scene) == 40_000, "there are no more than triangles"
     assert wanted(scene, replace(ASKED, triangles=10**6)) == 8 * usual
 
 
 def test_there_are_no_more_than_fit_into_memory(build, left, monkeypatch):
     left(0.5)
-    monkeypatch.setattr(cost, "free_memory_mb", lambda: 360.0)
-    assert wanted(build.furnished_room()) == 12_000
+    monkeypatch.setattr(cost, "free_memory_mb", lambda: 720.0)
+    assert wanted(build.furnished_room()) == 24_000
     monkeypatch.setattr(cost, "free_memory_mb", lambda: 30.0)
     assert wanted(build.furnished_room()) == choose_effort(build.furnished_room(), ASKED).patches
     monkeypatch.setattr(cost, "free_memory_mb", lambda: None)
-    assert wanted(build.furnished_room()) == 20_000
+    assert wanted(build.furnished_room()) == 40_000
 
 
 def test_a_bake_takes_as_many_and_counts_all_rays(build, left):
-    scene, settings = build.furnished_room(), replace(ASKED, triangles=9_000)
+    scene = build.furnished_room()
+    few = replace(choose_effort(scene, ASKED), patches=1000, most_patches=2200)
     left(0.0)
-    usual = bake(scene, settings).report
+    usual = bake(scene, ASKED, effort=few).report
     left(0.05)
-    finer = bake(scene, settings).report
+    finer = bake(scene, ASKED, effort=few).report
     assert finer.patches > 1.6 * usual.patches
     assert finer.rays["transport"] > usual.rays["transport"] * (1.0 + 0.9 * finer.patches / usual.patches)
     assert finer.estimated_error["transport"] < usual.estimated_error["transport"]
