@@ -30,8 +30,9 @@ _LONG, _BRIEF = 3, 20
 #: Seconds that a thread waits for the others: a busy machine may not start them all.
 _PATIENCE = 1.0
 #: Beyond Embree's own time, in numbers summed by one thread. That all threads share: of a ray that gathers, of one that
-#: looks for a lamp, of a transport ray that meets something and so makes a form factor, of a cell in each fit.
-_LOOK, _AIM, _FORM_FACTOR, _FIT = 24.0, 80.0, 60.0, 1200.0
+#: looks for a lamp, of the choice whether to ask one, of a transport ray that meets something and so makes a form
+#: factor, of a cell in each fit.
+_LOOK, _AIM, _CHOOSE, _FORM_FACTOR, _FIT = 24.0, 80.0, 25.0, 60.0, 1200.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
 _BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 30.0, 800.0, 1800.0, 6600.0, 3400.0, 1700.0
@@ -45,7 +46,7 @@ _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 1700.0, 15_000.0, 600.0
 class Work:
     """What a bake has to do. transport, gather, shadow: rays; cells: the triangles that light is fitted to; own: the
     triangles that the scene itself has; fits: how often the light is fitted to so many; contours: cells that they are
-    looked for in; rounds of finding where light bends."""
+    looked for in; rounds of finding where light bends; choices: of which lights to ask, one for each at each point."""
 
     transport: float = 0.0
     gather: float = 0.0
@@ -56,6 +57,7 @@ class Work:
     fits: float = 1.0
     contours: float = 0.0
     rounds: float = 0.0
+    choices: float = 0.0
 
     @property
     def memory_mb(self) -> float:
@@ -79,7 +81,8 @@ class Machine:
 
     def seconds(self, work: Work) -> float:
         looks, factors = work.gather + work.shadow, work.transport * self.closed
-        shared = work.gather * _LOOK + work.shadow * _AIM + factors * _FORM_FACTOR + work.cells * work.fits * _FIT
+        shared = work.gather * _LOOK + work.shadow * _AIM + work.choices * _CHOOSE
+        shared += factors * _FORM_FACTOR + work.cells * work.fits * _FIT
         alone = factors * _BALANCE + work.cells * (work.fits * _ASSEMBLE + _SPLIT_CELL)
         alone += work.patches * _SPLIT_PATCH + work.contours * _CONTOUR + work.own * _OWN + bool(work.cells) * _FIXED
         alone += work.rounds * _ROUND

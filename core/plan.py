@@ -339,7 +339,13 @@ class _Prices:
             points += _CONTOUR_POINTS * cells
         on_sides = 2 * SITES * patches * shadow_rays_of_site(effort)
         per_light = asked * (effort.shadow_rays * (points + surveyed) + on_sides)
-        works = {name: Work(shadow=per_light * number) for name, number in self._lights.items() if number}
+        # At the sides of both halves, and before that at both sides of the patches that light may vary in.
+        choices = points + surveyed + 4 * SITES * patches if count > MOST_ASKED else 0.0
+        works = {
+            name: Work(shadow=per_light * number, choices=choices * number)
+            for name, number in self._lights.items()
+            if number
+        }
         if planned.looks_around:
             looks = passes * (1.0 + hiding(self._settings.tessellate, effort.error))
             # One look serves all that it may meet: it counts for the first of them.
@@ -349,7 +355,8 @@ class _Prices:
                 gather=cells * looks * effort.gather_rays + surveyed * BEND_RAYS,
                 patches=patches,
             )
-            works[first] = replace(look, shadow=works[first].shadow) if first in works else look
+            lit = works.get(first, Work())
+            works[first] = replace(look, shadow=lit.shadow, choices=lit.choices)
             onward = next((name for name in ONWARD if planned.active(name)), None)
             if onward:
                 works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
