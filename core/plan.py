@@ -56,7 +56,8 @@ _LEFT_TO_TRIANGLES = 0.7
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
-#: Asked error from which on nobody looks whether patches leave more of it than they should: that costs what it brings.
+#: Asked error from which on patches grow fewer with its square, and nobody looks whether they leave more of it than
+#: they should: that costs what it brings.
 _ROUGH = 0.05
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6
@@ -388,7 +389,8 @@ def shadow_rays_of_site(effort: Effort) -> int:
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = asked_error(settings)
-    finer = min(max(0.02 / asked, 0.1), 4.0)
+    # Who asks for little is to wait for little: from there on there are fewer yet.
+    finer = float(np.clip(0.02 / asked * min(_ROUGH / asked, 1.0), 0.05, 4.0))
     estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
     patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
     may_add = settings.error is not None and settings.seconds is None and asked < _ROUGH
