@@ -382,8 +382,8 @@ class _Prices:
 
 
 def shadow_rays_of_site(effort: Effort) -> int:
-    """From each of the points of a patch to a lamp: what one misses the others of the same patch find."""
-    return max(effort.shadow_rays // SITES, 1)
+    """From each of the points of a patch to a lamp: what those miss the others of the same patch find."""
+    return max(effort.shadow_rays // SITES, 2)
 
 
 def choose_effort(scene: Scene, settings: Settings) -> Effort:

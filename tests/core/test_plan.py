@@ -11,6 +11,7 @@ import pytest
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.contours import Contours
 from radiosity_baker.core.cost import Machine
+from radiosity_baker.core.direct.crowd import Crowd
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import triangle_geometry, unit_space
 from radiosity_baker.core.pilot import Pilot
@@ -225,6 +226,34 @@ def test_less_time_asks_fewer_of_many_lamps(build):
     assert effort.lights > fewer[0] > fewer[1] >= fewer[2] == 4
     assert thriftier(replace(effort, lights=4), 24).lights == 4
     assert thriftier(replace(effort, lights=3), 24).lights == 3
+
+
+def test_choices_among_many_lamps_are_foreseen(build, monkeypatch):
+    """Within a factor of two of how often a bake asks which of them to ask. Seen to fail: choices that cost nothing."""
+    room = build.furnished_room()
+    lamps = [replace(LAMPS["point lamps"], name=f"Bulb {i}", position=(0.2 + 0.05 * i, 0.3, 1.6)) for i in range(30)]
+    settings, made = Settings(error=0.05, triangles=3000), []
+    choose_among = Crowd.choose
+
+    def counted(crowd, points, *given):
+        made.append(len(points) * len(lamps))
+        return choose_among(crowd, points, *given)
+
+    def foreseen(count):
+        scene = replace(room, lamps=tuple(lamps[:count]))
+        chosen = choose(scene, settings, Pilot(scene))
+        prices = _Prices(chosen, settings, Machine(1e-7, 1e-8, 1.0, 1))
+        return sum(work.choices for work in prices._works(prices.of(chosen.effort)).values())
+
+    monkeypatch.setattr(Crowd, "choose", counted)
+    bake(replace(room, lamps=tuple(lamps)), settings)
+    assert sum(made) / 2 < foreseen(30) < sum(made) * 2
+    assert foreseen(5) == 0.0
+
+
+def test_who_asks_for_little_gets_few_patches(ground):
+    asked = {0.2: 409, 0.1: 819, 0.05: 3276, 0.02: 8192, 0.01: 16_384, 0.001: 32_768}
+    assert {error: choose_effort(ground, Settings(error=error)).patches for error in asked} == asked
 
 
 def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):

@@ -9,6 +9,7 @@ from radiosity_baker.core import surroundings
 from radiosity_baker.core.direct.emitters import emitting_panels
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
+from radiosity_baker.core.form_factors.sides import SITES
 from radiosity_baker.core.hemisphere import Codes
 from radiosity_baker.core.parallel import Workers
 from radiosity_baker.core.patches import unit_space
@@ -113,6 +114,19 @@ def test_a_plane_reflects_and_receives_from_both_sides(build, transport):
         assert shows_back[name] == pytest.approx(shows_front[name], rel=0.01)
     # Each bounce between the two parallel squares keeps p F = 0.5 * 0.415253 of the light, as the catalogue has it.
     assert shows_front["escaped"] > 0.25 * shows_front["emitted"]
+
+
+def test_two_shadow_rays_from_each_point_of_a_side_are_enough(build, transport):
+    """Its other points find what those miss: the light of all sides is that of four rays each, to four deviations of as
+    many coins as there are points, which it would be if all lay in half shadow."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    block = build.box("block", (-0.63, -0.41, 0), (0.5, 0.47, 1.2), surface=0)
+    lamp = SunLamp("sun", (0.3, 0.2, -0.9), (3.0, 3.0, 3.0), 0.2)
+    scene = Scene((ground, block), (build.grey,), (lamp,))
+    few, many = (lit(transport, scene, patches=1500, shadow_rays=count) for count in (4, 16))
+    assert 0 < few.rays["shadow"] <= 2 * SITES * len(few.sides.side)
+    mean = [solved.sides.area @ solved.incoming[:, 0] for solved in (few, many)]
+    assert mean[0] == pytest.approx(mean[1], rel=4 * 0.5 / np.sqrt(SITES * len(few.sides.side)))
 
 
 def test_the_inside_of_a_solid_on_the_ground_stays_dark(build, transport):
