@@ -123,6 +123,11 @@ class Effort:
     emitters_by_rays: bool
     channels: int
 
+    @property
+    def shadow_rays_of_site(self) -> int:
+        """From each of the points of a patch to a lamp: what those miss the others of the same patch find."""
+        return max(self.shadow_rays // SITES, 2)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -338,7 +343,7 @@ class _Prices:
         points = cells * (passes + effort.boundary_passes * crossed)
         if surveyed and count <= MOST_CONTOURED:
             points += _CONTOUR_POINTS * cells
-        on_sides = 2 * SITES * patches * shadow_rays_of_site(effort)
+        on_sides = 2 * SITES * patches * effort.shadow_rays_of_site
         per_light = asked * (effort.shadow_rays * (points + surveyed) + on_sides)
         # At the sides of both halves, and before that at both sides of the patches that light may vary in.
         choices = points + surveyed + 4 * SITES * patches if count > MOST_ASKED else 0.0
@@ -351,13 +356,13 @@ class _Prices:
             looks = passes * (1.0 + hiding(self._settings.tessellate, effort.error))
             # One look serves all that it may meet: it counts for the first of them.
             first = next((name for name in LOOKING if planned.active(name)), "emitting surfaces")
-            look = Work(
+            look = replace(
+                works.get(first, Work()),
                 transport=2 * patches * effort.transport_rays,
                 gather=cells * looks * effort.gather_rays + surveyed * BEND_RAYS,
                 patches=patches,
             )
-            lit = works.get(first, Work())
-            works[first] = replace(look, shadow=lit.shadow, choices=lit.choices)
+            works[first] = look
             onward = next((name for name in ONWARD if planned.active(name)), None)
             if onward:
                 works[onward] = Work(gather=self._machine.onward * (look.transport + look.gather))
@@ -381,17 +386,13 @@ class _Prices:
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
 
 
-def shadow_rays_of_site(effort: Effort) -> int:
-    """From each of the points of a patch to a lamp: what those miss the others of the same patch find."""
-    return max(effort.shadow_rays // SITES, 2)
-
-
 def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = asked_error(settings)
-    # Who asks for little is to wait for little: from there on there are fewer yet.
+    onward = goes_on(scene)
+    # Who asks for little is to wait for little.
     finer = float(np.clip(0.02 / asked * min(_ROUGH / asked, 1.0), 0.05, 4.0))
-    estimator = "hemisphere" if settings.estimator == "auto" or goes_on(scene) else settings.estimator
+    estimator = "hemisphere" if settings.estimator == "auto" or onward else settings.estimator
     patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
     may_add = settings.error is not None and settings.seconds is None and asked < _ROUGH
     # Where light bends is no guide to where a texture has its detail.
@@ -405,7 +406,7 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
         patches=patches,
         most_patches=settings.triangles if estimator == "hemisphere" and may_add else 0,
         # Few rays whose tints are over one, as others' are under it, are no average.
-        transport_rays=64 if goes_on(scene) else 32,
+        transport_rays=64 if onward else 32,
         shadow_rays=4,
         lights=max(int(MOST_ASKED * min(0.02 / asked, 1.0)), _FEWEST_LIGHTS),
         gather_rays=gather_rays(asked, sum(len(o.triangles) for o in scene.receivers())),

@@ -15,7 +15,7 @@ from .form_factors.rows import Rows, balance, one_sided, symmetric_exchange
 from .form_factors.sides import SITES, Sides
 from .parallel import Workers
 from .patches import Patches
-from .plan import Effort, Plan, shadow_rays_of_site
+from .plan import Effort, Plan
 from .sampling import stream
 from .scene import ALBEDO_LIMIT, Float32, Float64
 from .sky import Sky
@@ -189,7 +189,7 @@ def fill_with_light(
     """Direct light on every side, and all that the sides then send to each other. sky: the one of the exchange, or
     None for its light to be left out."""
     sides = exchange.sides
-    incoming, shadow_rays = light_on_sides(sides, direct_light, workers, shadow_rays_of_site(effort), seed, purpose)
+    incoming, shadow_rays = light_on_sides(sides, direct_light, workers, effort.shadow_rays_of_site, seed, purpose)
     if sky is not None:
         incoming += exchange.opening.light @ sky.irradiance
     if effort.emitters_by_rays:
