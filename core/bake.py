@@ -26,7 +26,7 @@ from .pilot import Pilot
 from .plan import Effort, Plan, choose, price
 from .progress import Progress
 from .receivers import Receivers, make_receivers
-from .refinement import Light, average_light, refine
+from .refinement import Finer, FittedSurvey, Light, average_light, refine
 from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
@@ -101,23 +101,22 @@ def bake(
                 spent = sum((half.rays for half in halves), spent)
                 patches, direct_light = prepared(replace(effort, patches=wanted), Pilot(scene))
                 halves, surroundings = solved(patches, direct_light)
-        sampled, sky_light = direct_light, None
-        if of_sky and "sky" in settings.layers:
-            sampled, sky_light = (
-                DirectLight(part, direct_light.visibility, settings.seed, effort.lights) for part in (others, of_sky)
-            )
+        sampled, sky_light = told_apart(direct_light, others, of_sky if "sky" in settings.layers else [])
 
         def begun_on(some: Receivers) -> Survey:
             return Survey(some, sampled, surroundings, effort, settings.seed, workers, sky_light)
 
         with clock.stage("tessellate", 0.28):
-            survey = finer_where_it_matters(
+            survey, finer = finer_where_it_matters(
                 begun_on, scene, receivers, direct_light, surroundings, effort, settings.seed, workers
             )
             survey.rays += spent
             del receivers  # large meshes need the room
-        baked = Baked(planned, patches, halves, survey)
-        light = refine(survey, scene, settings, effort, workers, clock, partial(show, baked))
+        so_far = partial(Baked, planned, patches, halves)
+        survey, light = refine(
+            survey, scene, settings, effort, workers, clock, lambda survey, light: show(so_far(survey), light), finer
+        )
+        baked = so_far(survey)
     if memory:
         memory.remember(given, settings, baked, light)
     with clock.stage("layers", 0.97):
@@ -131,6 +130,15 @@ def sources(chosen: Plan, around: Scene, space: Space) -> tuple[list[Source], li
     others += emitting_panels(around, space)
     sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
     return others, list[Source](of_sky), sky
+
+
+def told_apart(
+    direct_light: DirectLight, others: list[Source], of_sky: list[Source]
+) -> tuple[DirectLight, DirectLight | None]:
+    """The direct light without that of the sky, and that of the sky, if there is any to be told apart."""
+    if not of_sky:
+        return direct_light, None
+    return direct_light.only(others), direct_light.only(of_sky)
 
 
 def first_light(
@@ -160,28 +168,41 @@ def finer_where_it_matters(
     effort: Effort,
     seed: int,
     workers: Workers,
-) -> Survey:
+) -> tuple[Survey, Finer | None]:
     """A survey of the receivers, as `begun_on` starts one. Their triangles are cut where light breaks, and split where
     it bends if they start coarse; meshes that are kept are sampled more finely where light breaks. There a first pass
-    tells where, which serves on."""
+    tells where, which serves on. And what makes them finer yet, once more is known, if they started coarse."""
     contours = Contours(scene, direct_light, surroundings, seed, workers)
     if effort.coarsest > 1 and receivers.tessellated:
-        bends = Bends(direct_light, surroundings, contours, effort, seed, workers)
-        survey = begun_on(bends.refine(scene, receivers, len(receivers.cells) + effort.triangles))
+        limit = len(receivers.cells) + effort.triangles
+        bends = Bends(receivers, limit, direct_light, surroundings, contours, effort, seed, workers)
+        survey = begun_on(bends.refine(scene))
         survey.rays += bends.rays + contours.rays
-        return survey
+
+        def finer(earlier: Survey, found: FittedSurvey) -> Survey | None:
+            cast = bends.rays + contours.rays
+            split = bends.finer(earlier, found)
+            earlier.rays += bends.rays + contours.rays - cast
+            if split is None:
+                return None
+            survey = begun_on(split)
+            survey.recall(earlier)
+            survey.rays += earlier.rays
+            return survey
+
+        return survey, finer
     survey = begun_on(receivers)
     survey.run_pass()
     adaptation = Adaptation(direct_light, surroundings, seed, workers)
     limit = len(receivers.cells) + int(effort.growth * effort.triangles)
-    finer = adaptation.refine_receivers(survey, limit, effort.error)
-    if finer.tessellated:
-        finer = contours.cut(finer)[0]
-    if finer is not receivers:
-        first, survey = survey, begun_on(finer)
+    finest = adaptation.refine_receivers(survey, limit, effort.error)
+    if finest.tessellated:
+        finest = contours.cut(finest)[0]
+    if finest is not receivers:
+        first, survey = survey, begun_on(finest)
         survey.recall(first)
         survey.rays += first.rays
         del first  # before it needs room for more
         survey.run_pass()
     survey.rays += adaptation.rays + contours.rays
-    return survey
+    return survey, None

@@ -17,7 +17,7 @@ from .gather import Points
 from .parallel import Workers
 from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
-from .refinement import fit_samples, judge_samples
+from .refinement import FittedSurvey, fit_samples, judge_samples
 from .sampling import stream, subseed
 from .scene import Bool, Scene
 from .splitting import until_allowed
@@ -38,10 +38,12 @@ _SMALLEST = 4.0**-3
 
 
 class Bends:
-    """Splits triangles where light bends. rays: cast so far, by purpose."""
+    """Splits the triangles of receivers where light bends, up to about `limit` cells. rays: cast so far, by purpose."""
 
     def __init__(
         self,
+        receivers: Receivers,
+        limit: int,
         direct_light: DirectLight,
         around: Surroundings | None,
         contours: Contours,
@@ -50,6 +52,9 @@ class Bends:
         workers: Workers,
     ) -> None:
         self.rays: Counter[str] = Counter()
+        self._limit = limit
+        #: Before contours cut them, and from which of these cells those come that are left of the cuts.
+        self._uncut, self._source = receivers, np.arange(len(receivers.cells))
         self._light = direct_light
         self._around = around and around.with_rays(BEND_RAYS, stream(seed, "bend patterns"))
         self._effort = effort
@@ -57,24 +62,36 @@ class Bends:
         self._seed = seed
         self._workers = workers
 
-    def refine(self, scene: Scene, receivers: Receivers, limit: int) -> Receivers:
-        """The receivers with at most about `limit` cells, cut along contours, and finer where light still bends by more
-        than is allowed."""
+    def refine(self, scene: Scene) -> Receivers:
+        """The receivers, cut along contours, and finer where light still bends by more than is allowed."""
         survey, least = None, 0.0
         for number in range(BEND_ROUNDS):
-            trial, source = self._contours.cut(receivers, least)
+            trial = self._cut(least)
             survey = self._surveyed(trial, number, survey)
+            found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
             # The errors of small cells are known better: some room is left for those of later rounds.
-            room = (limit - len(source)) // (1 if number == BEND_ROUNDS - 1 else 2)
-            large = receivers.cells.area > _SMALLEST * receivers.cells.area.sum() / limit
-            chosen, enough, spared = self._worst(scene, survey, source, large, room)
+            chosen, enough, spared = self._worst(survey, found, 1.0 if number == BEND_ROUNDS - 1 else 0.5)
             least = _CUT * spared
             if not chosen.any():
                 return trial
-            receivers = split_cells(receivers, chosen)[0]
+            self._uncut = split_cells(self._uncut, chosen)[0]
             if enough:
                 break
-        return self._contours.cut(receivers, least)[0]
+        return self._cut(least)
+
+    def finer(self, survey: Survey, found: FittedSurvey) -> Receivers | None:
+        """The same once more for a survey of what is there by now, and what was found in it; None where no triangle is
+        to be split."""
+        chosen, _, spared = self._worst(survey, found)
+        if not chosen.any():
+            return None
+        self._uncut = split_cells(self._uncut, chosen)[0]
+        return self._cut(_CUT * spared)
+
+    def _cut(self, least: float) -> Receivers:
+        """The triangles there are by now, cut along contours; least: as there."""
+        receivers, self._source = self._contours.cut(self._uncut, least)
+        return receivers
 
     def _surveyed(self, receivers: Receivers, number: int, earlier: Survey | None) -> Survey:
         """Samples of the receivers' cells, of those that an earlier survey had as well the same."""
@@ -90,18 +107,19 @@ class Bends:
         self.rays += survey.rays
         return survey
 
-    def _worst(self, scene: Scene, survey: Survey, source: Int64, large: Bool, room: int) -> tuple[Bool, bool, float]:
-        """Of the large (c,) cells, from which those of the survey come, the ones with the largest squared error, so
-        many that what is left is allowed, while there is room; and whether it will be once they are split, so that
-        nobody need look again; and the largest squared error of those for which there is no room."""
-        found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
-        # What smoothing takes for want of samples, smaller triangles do not bring back.
-        pieces = found.area * found.shown * sum(fitted.unresolved for fitted in found.fits)
+    def _worst(self, survey: Survey, found: FittedSurvey, share: float = 1.0) -> tuple[Bool, bool, float]:
+        """Of the uncut cells (c,) those with the largest squared error, so many that what is left is allowed, while
+        there is room, of which a share may be taken; and whether it will be allowed once they are split, so that nobody
+        need look again; and the largest squared error of those for which there is no room."""
+        area = self._uncut.cells.area
+        large = area > _SMALLEST * area.sum() / self._limit
+        room = int(share * (self._limit - len(self._source)))
+        pieces = found.unresolved
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
-        squared = np.bincount(source, pieces, len(large)).astype(np.float64)
-        allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(survey.receivers.cells.area.sum())
+        squared = np.bincount(self._source, pieces, len(large)).astype(np.float64)
+        allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(area.sum())
         chosen = np.zeros(len(large), dtype=bool)
         total = float(np.maximum(squared, 0.0).sum())
         # What is split adds to what is left; where it alone is more than is allowed, there will be another round.

@@ -158,7 +158,8 @@ def _unit(lamp: Lamp) -> Lamp:
 
 def _refined(baked: Baked, settings: Settings, workers: Workers, clock: Clock) -> Light:
     """The light after more passes, until the new question is answered."""
-    return refine(baked.survey, baked.plan.scene, settings, baked.plan.effort, workers, clock, lambda _: None)
+    effort = baked.plan.effort
+    return refine(baked.survey, baked.plan.scene, settings, effort, workers, clock, lambda *_: None)[1]
 
 
 def _relit(last: _Last, changes: dict[str, Float64]) -> Light:

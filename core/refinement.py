@@ -35,8 +35,14 @@ from .transport import in_three_channels
 _HIDDEN = 0.25
 #: Up to which error fits are as near to the best as they can be; and how many times as far from it at most, beyond.
 _TIGHT, _MOST_LOOSE = 0.01, 10.0
+#: Share of the asked error that finer triangles are taken to leave.
+_LEFT_TO_TRIANGLES = 0.7
 #: How often the error is estimated anew, and how many times as many passes each time at most: more cannot be foreseen.
 _MOST_ROUNDS, _MOST_GROWTH = 3, 4
+
+
+#: Of a survey, and of what was found in it: one with finer triangles and as many passes' samples to recall, or None.
+Finer = Callable[[Survey, "FittedSurvey"], Survey | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,12 +79,15 @@ def refine(
     effort: Effort,
     workers: Workers,
     clock: Clock,
-    show: Callable[[Light], None],
-) -> Light:
-    """Passes until the estimated error, or the clock, says so. show: takes the light after each pass, if watched."""
+    show: Callable[[Survey, Light], None],
+    finer: Finer | None = None,
+) -> tuple[Survey, Light]:
+    """Passes, and finer triangles, until the estimated error, or the clock, says so. show: takes the light after each
+    pass, if watched; finer: gives finer triangles where these leave too much of an asked error, if that can be."""
     seconds = settings.seconds or np.inf
+    asked = settings.error or 0.0
 
-    def fitted(begin: float, error: float | None = None) -> Light:
+    def fitted(begin: float, error: float | None = None) -> tuple[Light, FittedSurvey]:
         with clock.stage("fit", begin, error):
             judged, buried = workers.beside(partial(judge_samples, survey, scene, workers), survey.buried)
         left = seconds - clock.elapsed - clock.seconds["fit"]
@@ -97,66 +106,80 @@ def refine(
     tried: list[tuple[int, ErrorEstimate]] = []
     for round_number in range(_MOST_ROUNDS):
         fits = clock.seconds.get("fit", 0.0)
-        light = fitted(0.75 + 0.05 * round_number)
+        light, found = fitted(0.75 + 0.05 * round_number)
         if clock.progress.watched:
-            show(light)
+            show(survey, light)
         if settings.error is None and settings.seconds is None:
             break
         tried.append((survey.passes, light.error))
+        with clock.stage("tessellate", 0.77 + 0.05 * round_number, light.error.total):
+            split = finer(survey, found) if finer and light.error.total > asked > 0.0 else None
         left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
-        more = passes_wanted(tried, settings.error or 0.0)
+        more = passes_wanted(tried, asked, _LEFT_TO_TRIANGLES * asked if split else np.inf)
         more = int(min(more, max(left, 0.0) * passes / clock.seconds["gather"])) // 2 * 2
-        if more < 2:
+        if split is None and more < 2:
             break
-        passes += more
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
+            if split:
+                survey = _caught_up(split, survey.passes, effort.boundary_passes)
             for _ in range(more):
                 survey.run_pass()
             survey.refine_boundaries(more)
+        passes += more
     else:
-        light = fitted(0.95, light.error.total)
-    return light
+        light, _ = fitted(0.95, light.error.total)
+    return survey, light
 
 
-def _run_passes(survey: Survey, passes: int, clock: Clock, show: Callable[[Light], None]) -> None:
+def _run_passes(survey: Survey, passes: int, clock: Clock, show: Callable[[Survey, Light], None]) -> None:
     for number in range(passes):
         begin, end = (0.3 + 0.4 * n / passes for n in (number, number + 1))
         clock.progress.report("gather", begin, until=end)
         survey.run_pass()
         if clock.progress.watched:
-            show(average_light(survey))
+            show(survey, average_light(survey))
 
 
-def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float) -> int:
+def _caught_up(survey: Survey, passes: int, boundary_passes: int) -> Survey:
+    """With as many samples of fresh cells as of those that were recalled."""
+    while survey.passes < passes:
+        survey.run_pass()
+    survey.refine_boundaries(boundary_passes)
+    return survey
+
+
+def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float, resolution: float = np.inf) -> int:
     """How many more passes, an even number, bring the total error to what is asked, or sampling to where it no longer
-    shows beside the rest. tried: how many passes there were at each fit, and the error they left.
+    shows beside the rest. tried: how many passes there were at each fit, and the error they left; resolution: what
+    finer triangles will leave of it.
 
     The squared sampling error is a / passes + b. What is fixed, b, is the noise of the patches, which no pass lowers;
     it is known from the second fit on.
     """
     passes, error = tried[-1]
-    rest = error.transport**2 + error.resolution**2
+    rest = error.transport**2 + min(error.resolution, resolution) ** 2
     target = max(asked**2 - rest, _HIDDEN * rest)
     sampling, fixed = error.sampling**2, 0.0
     if sampling <= target:
         return 0
-    if len(tried) > 1:
-        before, earlier = tried[-2]
+    fewer = [(before, earlier) for before, earlier in tried if before < passes]
+    if fewer:
+        before, earlier = fewer[-1]
         falling = max(earlier.sampling**2 - sampling, 0.0) / (passes / before - 1.0)
         fixed = max(sampling - falling, 0.0)
     wanted = (sampling - fixed) / max(target - fixed, fixed, 1e-30)
     return max(2 * ceil(passes * (min(wanted, _MOST_GROWTH) - 1.0) / 2.0), 0)
 
 
-def fit_light(survey: Survey, judged: Judged, buried: Bool, workers: Workers) -> Light:
-    """Least squares onto the vertices, for direct and indirect light each as smooth as it was judged, and its error.
-    buried (e,): output triangles inside solids."""
+def fit_light(survey: Survey, judged: Judged, buried: Bool, workers: Workers) -> tuple[Light, FittedSurvey]:
+    """Least squares onto the vertices, for direct and indirect light each as smooth as it was judged, and its error;
+    and what that was found from. buried (e,): output triangles inside solids."""
     found = fit_samples(survey, judged, workers)
     transport = _squared_transport_error(survey, found.fits)
     error, cell_error = estimate_error(
         found.fits, transport, found.area, found.shown, found.radiance, survey.missed_sky
     )
-    return replace(found.light, error=error, cell_error=cell_error, buried=buried)
+    return replace(found.light, error=error, cell_error=cell_error, buried=buried), found
 
 
 def _squared_transport_error(survey: Survey, fits: list[Fitted]) -> Float64:
@@ -192,6 +215,12 @@ class FittedSurvey:
     area: Float64
     shown: Float64
     radiance: float
+
+    @property
+    def unresolved(self) -> Float64:
+        """(c,) squared error of the radiance, times the area, that smaller triangles would not leave. What smoothing
+        takes for want of samples they do not bring back."""
+        return np.asarray(self.area * self.shown * sum(fitted.unresolved for fitted in self.fits))
 
 
 def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:

@@ -105,6 +105,7 @@ class Survey:
         self._shift[here] = earlier._shift[there]
         self._fresh, self._recalled = np.setdiff1d(self._fresh, here), earlier.passes
         self._refined[here] = (earlier.direct[0].tried + earlier.direct[1].tried)[there] > earlier.passes
+        self._extra, self._longer = earlier._extra, earlier._longer
 
     def _index(self, number: int) -> NDArray[np.int64] | slice:
         """The cells that a pass looks at; a slice where they are all, for sums over that take no copies."""

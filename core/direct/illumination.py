@@ -121,10 +121,14 @@ class DirectLight:
         self.lights = lights = [source for source in sources if not isinstance(source, EmitterTree)]
         self._trees = [source for source in sources if isinstance(source, EmitterTree)]
         self._crowd = Crowd(lights) if len(lights) > MOST_ASKED else None
-        self._asked = asked
+        self._asked, self._seed = asked, seed
         self.visibility = visibility
         # A random bit pattern for each light: the sum over the lights seen names their set.
         self._names = stream(seed, "light names").integers(1, 2**40, size=len(lights))
+
+    def only(self, sources: Sequence[Source]) -> DirectLight:
+        """What these of the sources bring."""
+        return DirectLight(sources, self.visibility, self._seed, self._asked)
 
     def at(
         self, points: Float64, normals: Float64, shading: Float64, rays: int, rng: np.random.Generator
