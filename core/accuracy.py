@@ -317,7 +317,12 @@ def estimate_error(
     scale += missed * float(np.sqrt(weight.sum()))
     if scale <= 0:
         return ErrorEstimate(0.0, 0.0, 0.0), np.zeros_like(area)
-    squares = [sum(p.sampling for p in parts), transport + missed**2, sum(p.resolution for p in parts)]
-    causes = [np.sqrt(max(float(weight @ square), 0.0)) / scale for square in squares]
-    local = sum(np.maximum(square, 0.0) for square in squares) * shown
-    return ErrorEstimate(causes[0], causes[1], causes[2]), local
+    causes = [
+        [p.sampling for p in parts],
+        [transport + missed**2],
+        # Noise may make a little smoothing less than none: that takes nothing away from what triangles cannot show.
+        [square for p in parts for square in (p.unresolved, p.smoothed)],
+    ]
+    relative = [np.sqrt(sum(max(float(weight @ square), 0.0) for square in cause)) / scale for cause in causes]
+    local = sum(np.maximum(sum(cause), 0.0) for cause in causes) * shown
+    return ErrorEstimate(*relative), local

@@ -112,7 +112,7 @@ def refine(
         if settings.error is None and settings.seconds is None:
             break
         tried.append((survey.passes, light.error))
-        with clock.stage("tessellate", 0.77 + 0.05 * round_number, light.error.total):
+        with clock.stage("tessellate", 0.79 + 0.05 * round_number, light.error.total):
             split = finer(survey, found) if finer and light.error.total > asked > 0.0 else None
         left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
         more = passes_wanted(tried, asked, _LEFT_TO_TRIANGLES * asked if split else np.inf)

@@ -10,9 +10,12 @@ from radiosity_baker.core.accuracy import (
     COARSENING,
     PARABOLA_BEND,
     STEP_BEND,
+    Fitted,
+    _Halves,
     _unresolved,
     _unresolved_by_kind,
     cross_validate,
+    estimate_error,
     fit_halves,
     level_error,
     squared_mean,
@@ -232,6 +235,20 @@ def test_what_lies_beside_a_break_says_nothing_of_the_rest():
     assert found[:100] == pytest.approx(1 / 40, rel=0.03)
     assert found[100:] == pytest.approx(1 / 5)
     assert _unresolved(bend, distance, noise, weight)[:100].mean() > 2 / 40
+
+
+def test_noise_takes_nothing_away_from_what_triangles_cannot_show():
+    """Two parts, of which one's smoothing has come out as less than none: 3 and 4 % of unresolved light make 5."""
+    cells, nothing = np.full(100, 1.0), np.zeros(100)
+    empty = _Halves(nothing, nothing)
+    parts = [
+        Fitted(nothing, (nothing, nothing), nothing, nothing, nothing, bent**2 * cells, smooth * cells, empty, nothing)
+        for bent, smooth in ((0.03, 0.0), (0.04, -0.01))
+    ]
+    error, local = estimate_error(parts, nothing, cells, cells, 1.0)
+    assert error.resolution == pytest.approx(0.05)
+    assert error.total == pytest.approx(0.05)
+    assert (local >= 0.0).all()
 
 
 def test_the_mean_of_a_squared_linear_function():

@@ -15,6 +15,7 @@ from radiosity_baker.core.result import BakedObject
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.tessellation import triform, whole
+from radiosity_baker.tests.core.conftest import furnished_room
 
 
 @pytest.fixture(scope="module")
@@ -119,3 +120,16 @@ def test_nobody_looks_again_where_what_is_split_is_enough(build, monkeypatch):
     fine = bake(scene, Settings(triangles=6000, error=0.005, threads=2)).report
     assert looks[1:4] == [0, 1, 2]
     assert fine.estimated_error["resolution"] <= 0.005
+
+
+def test_what_the_first_look_has_missed_is_split_once_it_is_seen(monkeypatch):
+    """As if nothing bent at first: the error is stated, and triangles are split until it is what was asked for."""
+    monkeypatch.setattr(Bends, "refine", lambda bends, _: bends._cut(0.0))
+    settings = Settings(triangles=20_000, error=0.02, threads=2)
+    split = bake(furnished_room(), settings)
+    assert split.report.estimated_error["total"] <= 0.02
+    monkeypatch.setattr(Bends, "finer", lambda *_: None)
+    coarse = bake(furnished_room(), settings)
+    assert coarse.report.estimated_error["resolution"] > 0.02
+    assert sum(len(o.triangles) for o in split.objects) > 1.5 * sum(len(o.triangles) for o in coarse.objects)
+    assert split.report.rays["gather"] > coarse.report.rays["gather"]

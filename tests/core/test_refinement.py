@@ -45,3 +45,17 @@ def test_it_looks_again_before_it_spends_much():
     assert passes_wanted([left(0.5)], asked=0.001) == 6
     assert passes_wanted([left(0.5, at=8)], asked=0.001) == 24
     assert passes_wanted([left(0.5)], asked=0.0) == 6
+
+
+def test_samples_are_for_what_finer_triangles_will_leave():
+    """Triangles leave 0.05 of 0.05 and finer ones 0.03: there is room for 0.04 of sampling."""
+    coarse = [left(0.0401, rest=0.05)]
+    resolved = [(at, ErrorEstimate(error.sampling, 0.0, error.transport)) for at, error in coarse]
+    assert passes_wanted(resolved, 0.05, 0.03) == 2
+    assert passes_wanted([(2, ErrorEstimate(0.0399, 0.0, 0.05))], 0.05, 0.03) == 0
+    assert passes_wanted([(2, ErrorEstimate(0.0399, 0.0, 0.05))], 0.05) == 4
+
+
+def test_a_fit_on_finer_triangles_with_as_many_passes_tells_nothing_of_what_is_fixed():
+    first, second = left(0.02, at=2), left(0.02, at=2)
+    assert passes_wanted([first, second], asked=0.02 / np.sqrt(3.0)) == 4
