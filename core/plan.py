@@ -390,10 +390,11 @@ def choose_effort(scene: Scene, settings: Settings) -> Effort:
     """Finer patches and more rays for a smaller error; the quadratic estimators get fewer patches."""
     asked = asked_error(settings)
     onward = goes_on(scene)
-    # Who asks for little is to wait for little.
-    finer = float(np.clip(0.02 / asked * min(_ROUGH / asked, 1.0), 0.05, 4.0))
+    finer = float(np.clip(0.02 / asked, 0.1, 4.0))
     estimator = "hemisphere" if settings.estimator == "auto" or onward else settings.estimator
-    patches = int(8192 * finer) if estimator == "hemisphere" else int(1500 * finer)
+    # Who asks for little is to wait for little.
+    by_rays = int(8192 * finer * float(np.clip(_ROUGH / asked, 0.5, 1.0)))
+    patches = by_rays if estimator == "hemisphere" else int(1500 * finer)
     may_add = settings.error is not None and settings.seconds is None and asked < _ROUGH
     # Where light bends is no guide to where a texture has its detail.
     textured = any(varies(scene, o) for o in scene.receivers())

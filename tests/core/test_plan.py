@@ -254,6 +254,8 @@ def test_choices_among_many_lamps_are_foreseen(build, monkeypatch):
 def test_who_asks_for_little_gets_few_patches(ground):
     asked = {0.2: 409, 0.1: 819, 0.05: 3276, 0.02: 8192, 0.01: 16_384, 0.001: 32_768}
     assert {error: choose_effort(ground, Settings(error=error)).patches for error in asked} == asked
+    pairs = {0.2: 150, 0.1: 300, 0.02: 1500}
+    assert {e: choose_effort(ground, Settings(error=e, estimator="centroid")).patches for e in pairs} == pairs
 
 
 def test_light_that_has_bounced_calls_for_fewer_cells(build, monkeypatch):
