@@ -8,6 +8,7 @@ left is within the asked error. Where light is flat the coarse triangles stay.
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,8 +34,21 @@ _KEPT = 0.25
 #: share of the squared error of the worst cell that is not split: a cut makes half as many cells as a split and leaves
 #: less error, and a contour in tatters is worse to see than coarse cells. A cut for all is worse again, and so is six.
 _CUT = 0.25
+#: What share of the squared error triangles that are split once more must take away: it takes as long as all before.
+_WORTH = 0.1
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
+
+
+@dataclass(frozen=True, eq=False)
+class _Worst:
+    """Which uncut cells (c,) to split; what share of all squared error they lose by that; whether what is left then is
+    allowed, so that nobody need look again; and the largest squared error of those for which there is no room."""
+
+    chosen: Bool
+    gain: float
+    enough: bool
+    spared: float
 
 
 class Bends:
@@ -70,23 +84,23 @@ class Bends:
             survey = self._surveyed(trial, number, survey)
             found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
             # The errors of small cells are known better: some room is left for those of later rounds.
-            chosen, enough, spared = self._worst(survey, found, 1.0 if number == BEND_ROUNDS - 1 else 0.5)
-            least = _CUT * spared
-            if not chosen.any():
+            worst = self._worst(survey, found, 1.0 if number == BEND_ROUNDS - 1 else 0.5)
+            least = _CUT * worst.spared
+            if not worst.chosen.any():
                 return trial
-            self._uncut = split_cells(self._uncut, chosen)[0]
-            if enough:
+            self._uncut = split_cells(self._uncut, worst.chosen)[0]
+            if worst.enough:
                 break
         return self._cut(least)
 
     def finer(self, survey: Survey, found: FittedSurvey) -> Receivers | None:
-        """The same once more for a survey of what is there by now, and what was found in it; None where no triangle is
-        to be split."""
-        chosen, _, spared = self._worst(survey, found)
-        if not chosen.any():
+        """The same once more for a survey of what is there by now, and what was found in it; None where splitting as
+        many triangles as there is room for would bring too little."""
+        worst = self._worst(survey, found)
+        if worst.gain < _WORTH:
             return None
-        self._uncut = split_cells(self._uncut, chosen)[0]
-        return self._cut(_CUT * spared)
+        self._uncut = split_cells(self._uncut, worst.chosen)[0]
+        return self._cut(_CUT * worst.spared)
 
     def _cut(self, least: float) -> Receivers:
         """The triangles there are by now, cut along contours; least: as there."""
@@ -107,10 +121,9 @@ class Bends:
         self.rays += survey.rays
         return survey
 
-    def _worst(self, survey: Survey, found: FittedSurvey, share: float = 1.0) -> tuple[Bool, bool, float]:
-        """Of the uncut cells (c,) those with the largest squared error, so many that what is left is allowed, while
-        there is room, of which a share may be taken; and whether it will be allowed once they are split, so that nobody
-        need look again; and the largest squared error of those for which there is no room."""
+    def _worst(self, survey: Survey, found: FittedSurvey, share: float = 1.0) -> _Worst:
+        """The cells with the largest squared error, so many that what is left is allowed, while there is room, of which
+        a share may be taken."""
         area = self._uncut.cells.area
         large = area > _SMALLEST * area.sum() / self._limit
         room = int(share * (self._limit - len(self._source)))
@@ -128,7 +141,8 @@ class Bends:
         left = np.maximum(squared[~chosen], 0.0)
         spared = float(left.max(initial=0.0)) if left.sum() > uncut else 0.0
         chosen &= large
-        return chosen, bool(total - (1.0 - _KEPT) * squared[chosen].sum() <= allowed), spared
+        lost = (1.0 - _KEPT) * float(squared[chosen].sum())
+        return _Worst(chosen, lost / total if total > 0.0 else 0.0, total - lost <= allowed, spared)
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for

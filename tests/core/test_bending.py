@@ -107,7 +107,7 @@ def test_nobody_looks_again_where_what_is_split_is_enough(build, monkeypatch):
 
     def counted(self, *given):
         found = choose(self, *given)
-        split.append(found[0].sum())
+        split.append(found.chosen.sum())
         return found
 
     monkeypatch.setattr(Bends, "_surveyed", lambda *given: looks.append(given[2]) or look(*given))
@@ -133,3 +133,20 @@ def test_what_the_first_look_has_missed_is_split_once_it_is_seen(monkeypatch):
     assert coarse.report.estimated_error["resolution"] > 0.02
     assert sum(len(o.triangles) for o in split.objects) > 1.5 * sum(len(o.triangles) for o in coarse.objects)
     assert split.report.rays["gather"] > coarse.report.rays["gather"]
+
+
+def test_nobody_samples_again_for_a_handful_of_triangles(monkeypatch):
+    """There is room for two more splits, which bring next to nothing."""
+    finer, asked = Bends.finer, []
+
+    def crowded(bends, _):
+        trial = bends._cut(0.0)
+        bends._limit = len(bends._source) + 10
+        return trial
+
+    monkeypatch.setattr(Bends, "refine", crowded)
+    monkeypatch.setattr(Bends, "finer", lambda *given: asked.append(finer(*given)))
+    result = bake(furnished_room(), Settings(triangles=20_000, error=0.02, threads=2))
+    assert result.report.estimated_error["total"] > 0.02
+    assert asked
+    assert not any(asked)
