@@ -40,11 +40,6 @@ class Fitted:
     halves: _Halves
     tried: Float64
 
-    @property
-    def resolution(self) -> Float64:
-        """(c,) squared error that stays however many samples there are."""
-        return self.unresolved + self.smoothed
-
 
 @dataclass(frozen=True)
 class ErrorEstimate:
@@ -320,7 +315,7 @@ def estimate_error(
     causes = [
         [p.sampling for p in parts],
         [transport + missed**2],
-        # Noise may make a little smoothing less than none: that takes nothing away from what triangles cannot show.
+        # Noise may make a little smoothing less than none, in all: that hides nothing of what triangles cannot show.
         [square for p in parts for square in (p.unresolved, p.smoothed)],
     ]
     relative = [np.sqrt(sum(max(float(weight @ square), 0.0) for square in cause)) / scale for cause in causes]

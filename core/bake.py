@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 
 from .adaptation import Adaptation
 from .baked import Baked
@@ -112,7 +112,8 @@ def bake(
             )
             survey.rays += spent
             del receivers  # large meshes need the room
-        so_far = partial(Baked, planned, patches, halves)
+        # One for each survey: what it has worked out, it shows again.
+        so_far = lru_cache(1)(partial(Baked, planned, patches, halves))
         survey, light = refine(
             survey, scene, settings, effort, workers, clock, lambda survey, light: show(so_far(survey), light), finer
         )

@@ -56,8 +56,8 @@ _LEFT_TO_TRIANGLES = 0.7
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
 PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
-#: Asked error from which on patches grow fewer with its square, and nobody looks whether they leave more of it than
-#: they should: that costs what it brings.
+#: Asked error from which on patches for rays grow fewer with its square, down to half, and nobody looks whether they
+#: leave more of it than they should: that costs what it brings.
 _ROUGH = 0.05
 #: How many times as many patches there are after those have been split that light breaks in: typical.
 _MORE_PATCHES = 1.6

@@ -83,7 +83,8 @@ def refine(
     finer: Finer | None = None,
 ) -> tuple[Survey, Light]:
     """Passes, and finer triangles, until the estimated error, or the clock, says so. show: takes the light after each
-    pass, if watched; finer: gives finer triangles where these leave too much of an asked error, if that can be."""
+    pass, if watched; finer: gives finer triangles where these leave too much of an asked error, if that can be and no
+    time is set."""
     seconds = settings.seconds or np.inf
     asked = settings.error or 0.0
 
@@ -113,7 +114,7 @@ def refine(
             break
         tried.append((survey.passes, light.error))
         with clock.stage("tessellate", 0.79 + 0.05 * round_number, light.error.total):
-            split = finer(survey, found) if finer and light.error.total > asked > 0.0 else None
+            split = finer(survey, found) if finer and _too_coarse(light.error, settings) else None
         left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
         more = passes_wanted(tried, asked, _LEFT_TO_TRIANGLES * asked if split else np.inf)
         more = int(min(more, max(left, 0.0) * passes / clock.seconds["gather"])) // 2 * 2
@@ -122,6 +123,8 @@ def refine(
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
             if split:
                 survey = _caught_up(split, survey.passes, effort.boundary_passes)
+                # What other triangles left tells nothing of what passes on these have lowered.
+                tried.clear()
             for _ in range(more):
                 survey.run_pass()
             survey.refine_boundaries(more)
@@ -140,8 +143,14 @@ def _run_passes(survey: Survey, passes: int, clock: Clock, show: Callable[[Surve
             show(survey, average_light(survey))
 
 
+def _too_coarse(error: ErrorEstimate, settings: Settings) -> bool:
+    """Whether triangles leave too much of the asked error; whoever has set a time has none to begin again with."""
+    asked = settings.error or 0.0
+    return settings.seconds is None and error.total > asked > 0.0 and error.resolution > _LEFT_TO_TRIANGLES * asked
+
+
 def _caught_up(survey: Survey, passes: int, boundary_passes: int) -> Survey:
-    """With as many samples of fresh cells as of those that were recalled."""
+    """With as many passes for fresh cells as for those that were recalled, and their turn at shadow boundaries."""
     while survey.passes < passes:
         survey.run_pass()
     survey.refine_boundaries(boundary_passes)
@@ -162,9 +171,8 @@ def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float, resoluti
     sampling, fixed = error.sampling**2, 0.0
     if sampling <= target:
         return 0
-    fewer = [(before, earlier) for before, earlier in tried if before < passes]
-    if fewer:
-        before, earlier = fewer[-1]
+    if len(tried) > 1:
+        before, earlier = tried[-2]
         falling = max(earlier.sampling**2 - sampling, 0.0) / (passes / before - 1.0)
         fixed = max(sampling - falling, 0.0)
     wanted = (sampling - fixed) / max(target - fixed, fixed, 1e-30)

@@ -224,8 +224,9 @@ class Survey:
 
     def refine_boundaries(self, passes: int) -> None:
         """More points, for direct light only, in the cells where shadow boundaries leave it uncertain. Those that were
-        recalled with more of them have had their turn."""
+        recalled with more of them have had the first turn."""
         chosen = np.flatnonzero(self._uncertain() & ~self.invalid & ~self._refined)
+        self._refined[:] = False
         if not len(chosen):
             return
         together = max(_BESIDE // len(chosen), 1)

@@ -123,7 +123,7 @@ def stated_and_true(floor, light, rng, noise=0.0) -> tuple[float, float]:
     area = floor.cells.area
     halves, fit = sampled_twice(floor, light, rng, noise)
     fitted = fit_halves(fit, halves, cross_validate(fit, halves, area, np.ones(len(area))))
-    stated = area @ (fitted.sampling + fitted.resolution) / area.sum()
+    stated = area @ (fitted.sampling + fitted.unresolved + fitted.smoothed) / area.sum()
     return stated, squared_error(floor, light, fit.at_corners(fitted.values)[..., 0], rng)
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from radiosity_baker.core import baked as core_baked
 from radiosity_baker.core.bake import bake
 from radiosity_baker.core.patches import triangle_geometry
 from radiosity_baker.core.progress import Cancelled, Progress
@@ -386,6 +387,20 @@ def test_progress_rises_from_nothing_to_the_end(terrace):
     assert fractions == sorted(fractions)
     assert 0.95 <= fractions[-1] <= 1
     assert {stage for stage, _ in progress.reports} >= {"plan", "tessellate", "transport", "gather", "fit", "layers"}
+
+
+def test_all_looks_at_the_same_triangles_share_what_was_worked_out(terrace, monkeypatch):
+    """The rays that tell how much escapes are cast for the first light, and once for what comes after it."""
+
+    class Shown(Progress):
+        def show(self, so_far):
+            shown.append(so_far())
+
+    shown, cast, share = [], [], core_baked.escaped_share
+    monkeypatch.setattr(core_baked, "escaped_share", lambda *given: cast.append(given) or share(*given))
+    preview(terrace, Shown(watched=True))
+    assert len(shown) > 2
+    assert len(cast) == 2
 
 
 def test_cancelling_stops_the_bake_at_every_stage(build):

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.accuracy import ErrorEstimate
-from radiosity_baker.core.refinement import passes_wanted
+from radiosity_baker.core.refinement import _too_coarse, passes_wanted
+from radiosity_baker.core.settings import Settings
 
 
 def left(falling, fixed=0.0, rest=0.0, at=2):
@@ -56,6 +57,15 @@ def test_samples_are_for_what_finer_triangles_will_leave():
     assert passes_wanted([(2, ErrorEstimate(0.0399, 0.0, 0.05))], 0.05) == 4
 
 
-def test_a_fit_on_finer_triangles_with_as_many_passes_tells_nothing_of_what_is_fixed():
-    first, second = left(0.02, at=2), left(0.02, at=2)
-    assert passes_wanted([first, second], asked=0.02 / np.sqrt(3.0)) == 4
+@pytest.mark.parametrize(
+    ("sampling", "resolution", "settings", "split"),
+    [
+        (0.01, 0.019, Settings(error=0.02), True),
+        (0.001, 0.019, Settings(error=0.02), False),  # it is as good as was asked
+        (0.02, 0.012, Settings(error=0.02), False),  # samples are what is missing
+        (0.01, 0.019, Settings(error=0.02, seconds=5.0), False),
+        (0.01, 0.019, Settings(error=None), False),
+    ],
+)
+def test_triangles_are_split_again_only_where_they_are_to_blame(sampling, resolution, settings, split):
+    assert _too_coarse(ErrorEstimate(sampling, 0.0, resolution), settings) is split

@@ -113,6 +113,9 @@ def test_shadow_boundaries_are_looked_at_once(surveyed):
     assert len(again) > 0
     assert (second.valid_samples[again] == 6).all()
     assert second.valid_samples[fresh].max() == 6
+    # From then on all are alike.
+    second.refine_boundaries(2)
+    assert second.valid_samples[again].max() == 8
 
 
 @pytest.fixture
