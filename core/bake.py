@@ -174,6 +174,13 @@ def finer_where_it_matters(
     it bends if they start coarse; meshes that are kept are sampled more finely where light breaks. There a first pass
     tells where, which serves on. And what makes them finer yet, once more is known, if they started coarse."""
     contours = Contours(scene, direct_light, surroundings, seed, workers)
+
+    def gone_on(earlier: Survey, receivers: Receivers) -> Survey:
+        survey = begun_on(receivers)
+        survey.recall(earlier)
+        survey.rays += earlier.rays
+        return survey
+
     if effort.coarsest > 1 and receivers.tessellated:
         limit = len(receivers.cells) + effort.triangles
         bends = Bends(receivers, limit, direct_light, surroundings, contours, effort, seed, workers)
@@ -184,12 +191,7 @@ def finer_where_it_matters(
             cast = bends.rays + contours.rays
             split = bends.finer(earlier, found)
             earlier.rays += bends.rays + contours.rays - cast
-            if split is None:
-                return None
-            survey = begun_on(split)
-            survey.recall(earlier)
-            survey.rays += earlier.rays
-            return survey
+            return gone_on(earlier, split) if split else None
 
         return survey, finer
     survey = begun_on(receivers)
@@ -200,10 +202,7 @@ def finer_where_it_matters(
     if finest.tessellated:
         finest = contours.cut(finest)[0]
     if finest is not receivers:
-        first, survey = survey, begun_on(finest)
-        survey.recall(first)
-        survey.rays += first.rays
-        del first  # before it needs room for more
+        survey = gone_on(survey, finest)  # which frees the first, before it needs room for more
         survey.run_pass()
     survey.rays += adaptation.rays + contours.rays
     return survey, None

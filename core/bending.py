@@ -34,7 +34,7 @@ _KEPT = 0.25
 #: share of the squared error of the worst cell that is not split: a cut makes half as many cells as a split and leaves
 #: less error, and a contour in tatters is worse to see than coarse cells. A cut for all is worse again, and so is six.
 _CUT = 0.25
-#: What share of the squared error triangles that are split once more must take away: it takes as long as all before.
+#: What share of the squared error triangles that are split once more must take away: it takes samples and another fit.
 _WORTH = 0.1
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3

@@ -206,9 +206,7 @@ def _response(baked: Baked, name: str, alphas: tuple[Float64, ...], workers: Wor
         rays.update(halves[-1].rays - exchange.rays)
     around = look_up(baked.patches, survey.visibility, tuple(halves), black, effort, seed)
     alone = Survey(survey.receivers, light, around, effort, seed, workers)
-    while alone.passes < survey.passes:
-        alone.run_pass()
-    alone.refine_boundaries(effort.boundary_passes)
+    alone.catch_up(survey.passes)
     alone.top_up(survey.indirect[0].tried + survey.indirect[1].tried)
     rays.update(alone.rays)
     return _Response(fit_alone(alone, alphas), tuple(halves))

@@ -51,7 +51,7 @@ _TREE_COST = 8
 #: what they learn; resolution with the square root.
 _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.008, 0.01, 32, 20_000
 #: Share of the asked error that triangles leave which are added where light calls for them: typical too.
-_LEFT_TO_TRIANGLES = 0.7
+LEFT_TO_TRIANGLES = 0.7
 #: How many times as many cells as is typical count as dense: then a few rays less of each lose nothing.
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
@@ -382,7 +382,7 @@ class _Prices:
         sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
         if effort.coarsest > 1.0 and cells < effort.triangles:
             # Triangles are added until what they leave is what was asked for, and no further.
-            rest = (_LEFT_TO_TRIANGLES * effort.error) ** 2
+            rest = (LEFT_TO_TRIANGLES * effort.error) ** 2
         return effort.passes * max(sampling / max(effort.error**2 - rest, rest / 4), 1.0)
 
 

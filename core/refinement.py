@@ -22,7 +22,7 @@ from .accuracy import (
 from .clock import Clock
 from .noise import samples_wanted
 from .parallel import Workers
-from .plan import Effort, hiding
+from .plan import LEFT_TO_TRIANGLES, Effort, hiding
 from .receivers import cell_colours
 from .reconstruction import Fit, Samples
 from .scene import Bool, Float64, Scene
@@ -35,8 +35,6 @@ from .transport import in_three_channels
 _HIDDEN = 0.25
 #: Up to which error fits are as near to the best as they can be; and how many times as far from it at most, beyond.
 _TIGHT, _MOST_LOOSE = 0.01, 10.0
-#: Share of the asked error that finer triangles are taken to leave.
-_LEFT_TO_TRIANGLES = 0.7
 #: How often the error is estimated anew, and how many times as many passes each time at most: more cannot be foreseen.
 _MOST_ROUNDS, _MOST_GROWTH = 3, 4
 
@@ -116,13 +114,14 @@ def refine(
         with clock.stage("tessellate", 0.79 + 0.05 * round_number, light.error.total):
             split = finer(survey, found) if finer and _too_coarse(light.error, settings) else None
         left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
-        more = passes_wanted(tried, asked, _LEFT_TO_TRIANGLES * asked if split else np.inf)
+        more = passes_wanted(tried, asked, LEFT_TO_TRIANGLES * asked if split else np.inf)
         more = int(min(more, max(left, 0.0) * passes / clock.seconds["gather"])) // 2 * 2
         if split is None and more < 2:
             break
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
             if split:
-                survey = _caught_up(split, survey.passes, effort.boundary_passes)
+                split.catch_up(survey.passes)
+                survey = split
                 # What other triangles left tells nothing of what passes on these have lowered.
                 tried.clear()
             for _ in range(more):
@@ -146,15 +145,7 @@ def _run_passes(survey: Survey, passes: int, clock: Clock, show: Callable[[Surve
 def _too_coarse(error: ErrorEstimate, settings: Settings) -> bool:
     """Whether triangles leave too much of the asked error; whoever has set a time has none to begin again with."""
     asked = settings.error or 0.0
-    return settings.seconds is None and error.total > asked > 0.0 and error.resolution > _LEFT_TO_TRIANGLES * asked
-
-
-def _caught_up(survey: Survey, passes: int, boundary_passes: int) -> Survey:
-    """With as many passes for fresh cells as for those that were recalled, and their turn at shadow boundaries."""
-    while survey.passes < passes:
-        survey.run_pass()
-    survey.refine_boundaries(boundary_passes)
-    return survey
+    return settings.seconds is None and error.total > asked > 0.0 and error.resolution > LEFT_TO_TRIANGLES * asked
 
 
 def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float, resolution: float = np.inf) -> int:

@@ -222,6 +222,12 @@ class Survey:
 
         return ~out_of_sight(points, around, enclosed, total, direct, self.mean, look)
 
+    def catch_up(self, passes: int) -> None:
+        """So many passes in all, and the first turn at shadow boundaries."""
+        while self.passes < passes:
+            self.run_pass()
+        self.refine_boundaries(self._effort.boundary_passes)
+
     def refine_boundaries(self, passes: int) -> None:
         """More points, for direct light only, in the cells where shadow boundaries leave it uncertain. Those that were
         recalled with more of them have had the first turn."""

@@ -15,7 +15,6 @@ from radiosity_baker.core.result import BakedObject
 from radiosity_baker.core.scene import PointLamp, Scene, SunLamp
 from radiosity_baker.core.settings import Settings
 from radiosity_baker.core.tessellation import triform, whole
-from radiosity_baker.tests.core.conftest import furnished_room
 
 
 @pytest.fixture(scope="module")
@@ -122,20 +121,20 @@ def test_nobody_looks_again_where_what_is_split_is_enough(build, monkeypatch):
     assert fine.estimated_error["resolution"] <= 0.005
 
 
-def test_what_the_first_look_has_missed_is_split_once_it_is_seen(monkeypatch):
+def test_what_the_first_look_has_missed_is_split_once_it_is_seen(build, monkeypatch):
     """As if nothing bent at first: the error is stated, and triangles are split until it is what was asked for."""
     monkeypatch.setattr(Bends, "refine", lambda bends, _: bends._cut(0.0))
     settings = Settings(triangles=20_000, error=0.02, threads=2)
-    split = bake(furnished_room(), settings)
+    split = bake(build.furnished_room(), settings)
     assert split.report.estimated_error["total"] <= 0.02
     monkeypatch.setattr(Bends, "finer", lambda *_: None)
-    coarse = bake(furnished_room(), settings)
+    coarse = bake(build.furnished_room(), settings)
     assert coarse.report.estimated_error["resolution"] > 0.02
     assert sum(len(o.triangles) for o in split.objects) > 1.5 * sum(len(o.triangles) for o in coarse.objects)
     assert split.report.rays["gather"] > coarse.report.rays["gather"]
 
 
-def test_nobody_samples_again_for_a_handful_of_triangles(monkeypatch):
+def test_nobody_samples_again_for_a_handful_of_triangles(build, monkeypatch):
     """There is room for two more splits, which bring next to nothing."""
     finer, asked = Bends.finer, []
 
@@ -146,7 +145,7 @@ def test_nobody_samples_again_for_a_handful_of_triangles(monkeypatch):
 
     monkeypatch.setattr(Bends, "refine", crowded)
     monkeypatch.setattr(Bends, "finer", lambda *given: asked.append(finer(*given)))
-    result = bake(furnished_room(), Settings(triangles=20_000, error=0.02, threads=2))
+    result = bake(build.furnished_room(), Settings(triangles=20_000, error=0.02, threads=2))
     assert result.report.estimated_error["total"] > 0.02
     assert asked
     assert not any(asked)
