@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ _NEGLIGIBLE = 1e-7
 #: Places on the rim of a disc, and at the corners of a rectangle or a triangle.
 _RIM = np.array([[0.98, 0.98, 0.98, 0.98], [0.0, 0.25, 0.5, 0.75]], dtype=np.float32)
 _CORNERS = np.array([[0.01, 0.99, 0.99, 0.01], [0.01, 0.01, 0.99, 0.99]], dtype=np.float32)
+#: Where a lamp shines unevenly, so many places on it tell each half of the rays what it would bring with nothing in the
+#: way. None of them takes a ray.
+_PLACES = 16
 #: Of more lights than this, each half of the rays asks at most so many at a point. Noise falls much faster with this
 #: number than time grows, up to about here: then rays cost more than the closed forms of all lights.
 MOST_ASKED = 24
@@ -87,11 +91,12 @@ class _Receivers:
 
 @dataclass(frozen=True, eq=False)
 class _Look:
-    """What ways (r, n) to a light bring: weights, of which so much arrived (k, r, n) and passed occluders and veils, in
-    one for all channels or, where there are veils, in each; free of occluders; clear of veils too; rays cast, by
-    purpose."""
+    """What ways (r, n) to a light bring: weights, were it even; what it sends along them (k, r, n), of which so much
+    arrived (k', r, n) and passed occluders and veils, in one for all channels or in each; free of occluders; clear of
+    veils too; rays cast, by purpose."""
 
     weights: Float32
+    sent: Float32
     arrived: Float32
     passed: Bool | Float32
     free: Bool
@@ -180,10 +185,21 @@ class DirectLight:
         # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
         halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
         look = self._look(light, receivers, _lattices(halves, per_half, len(share), rng))
-        shape = (halves, per_half, len(share))
-        weights, arrived = look.weights.reshape(shape).mean(axis=1), look.arrived.reshape(-1, *shape).mean(axis=2)
+
+        def of_halves(values: Float32) -> Float32:
+            return values.reshape(-1, halves, per_half, len(share)).mean(axis=2)
+
+        arrived = of_halves(look.arrived)
+        expected, weights = (np.broadcast_to(v, arrived.shape) for v in (share, of_halves(look.weights)))
+        uneven = _unevenly_lit(light, receivers)
+        if len(uneven):
+            expected, weights = expected.copy(), weights.copy()
+            places = _lattices(halves, _PLACES, len(uneven), rng)
+            sent = _share_sent(light.only(uneven), receivers.only(uneven), places, halves)
+            expected[:, :, uneven] = share[uneven] * sent
+            weights[:, :, uneven] = of_halves(look.sent)[:, :, uneven]
         # (halves, n, 1), or one for each channel.
-        seen = np.stack([_seen(share, weights, channel) for channel in arrived], axis=2)
+        seen = np.stack([_seen(*channel) for channel in zip(expected, weights, arrived, strict=True)], axis=2)
         whole = look.clear.all(axis=0)
         return _Answer(seen, whole, look.free.any(axis=0) & ~whole, look.rays)
 
@@ -248,15 +264,10 @@ class DirectLight:
 
     def _look(self, light: Light, receivers: _Receivers, unit: Float32) -> _Look:
         """Look along the ways to a light. Those that bring nothing count as free, for no ray is cast along them."""
-        points, normals, shading = receivers.along
-        ways = light.aim(points, unit)
-        towards = ways.towards
-        weights = np.maximum((towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
-        gains = light.gain(points, ways)
-        # One plane, or one for each channel.
-        brings = (weights if gains is None else weights * gains).reshape(-1, *weights.shape)
-        free = brings.max(axis=0) == 0
+        towards, weights, sent = _without_occluders(light, receivers, unit)
+        free = sent.max(axis=0) == 0
         # What lies below the surface itself is blocked by it, whatever the shading normal says.
+        normals = receivers.along[1]
         above = (towards * normals[:, None]).sum(axis=0) > 0
         if not light.casts_shadow:
             free |= above
@@ -264,10 +275,10 @@ class DirectLight:
         unblocked, tint, rays = self._trace(receivers, towards, sample, point)
         free[sample, point] = unblocked
         if tint is None:
-            return _Look(weights, brings * free, free[None], free, free, rays)
+            return _Look(weights, sent, sent * free, free[None], free, free, rays)
         passed = np.tile(free, (len(tint), 1, 1)).astype(np.float32)
         passed[:, sample, point] = tint
-        return _Look(weights, brings * passed, passed, free, (passed == 1).all(axis=0), rays)
+        return _Look(weights, sent, sent * passed, passed, free, (passed == 1).all(axis=0), rays)
 
     def _trace(
         self, receivers: _Receivers, towards: Float32, sample: NDArray[np.int64], point: NDArray[np.int64]
@@ -313,19 +324,49 @@ class _Tally:
         return Illumination(self.irradiance, self.variance, signature, self.rays)
 
 
-def _seen(share: Float64, weights: Float32, arrived: Float32) -> Float64:
+def _without_occluders(light: Light, receivers: _Receivers, unit: Float32) -> tuple[Float32, Float32, Float32]:
+    """Ways (3, r, n) to places of a light; what each would bring of an even one (r, n), and what it does of this one
+    (k, r, n), in one for all channels or in each."""
+    points, _, shading = receivers.along
+    ways = light.aim(points, unit)
+    weights = np.maximum((ways.towards * shading[:, None]).sum(axis=0), 0) * ways.inverse * ways.solid
+    gains = light.gain(points, ways)
+    return ways.towards, weights, (weights if gains is None else weights * gains).reshape(-1, *weights.shape)
+
+
+def _unevenly_lit(light: Light, receivers: _Receivers) -> NDArray[np.int64]:
+    """Receivers (m,) to which the outer places of a light send unlike shares of what an even one would: where a cone
+    ends, or behind a window that the sky shines through."""
+    if light.even:
+        return np.zeros(0, dtype=np.int64)
+    points, outer = receivers.along[0], _RIM if light.round else _CORNERS
+    ways = light.aim(points, np.repeat(outer[:, :, None], points.shape[1], axis=2))
+    gains = cast(Float32, light.gain(points, ways))
+    return np.flatnonzero((np.ptp(gains.reshape(-1, *ways.inverse.shape), axis=1) > 0).any(axis=0))
+
+
+def _share_sent(light: Light, receivers: _Receivers, unit: Float32, halves: int) -> Float32:
+    """How much of what an even light would send a light does, (k, h, n), by what each half of some places sends."""
+    _, weights, sent = _without_occluders(light, receivers, unit)
+    even, own = (
+        values.reshape(-1, halves, len(unit[0]) // halves, unit.shape[2]).mean(axis=2) for values in (weights, sent)
+    )
+    return np.divide(own, even, out=np.zeros_like(own), where=even > 0)
+
+
+def _seen(expected: Float64, weights: Float32, arrived: Float32) -> Float64:
     """How much of a light is seen, (h, n), by each half of the ways: mean weights (h, n), of which so much arrived.
 
-    share (n,) is what the weights are on average, and the difference corrects what arrived, as far as the light is
-    free: exactly the share where nothing is in the way, and exactly nothing where everything is. How far it is free the
+    expected (h, n) is what the weights are on average, and the difference corrects what arrived, as far as the light is
+    free: exactly that where nothing is in the way, and exactly nothing where everything is. How far it is free the
     other half tells (control variates; A. Owen, Monte Carlo theory, methods and examples, chapter 8.9), so the answer
     is right on average, which the ratio of the two sums is not. A single way has no other half.
     """
     free = np.divide(arrived, weights, out=np.ones_like(weights), where=weights > 0)
     if len(free) == 1:
-        return share * free
+        return expected * free
     other = free[::-1].astype(np.float64)
-    return other * share + (arrived - other * weights)
+    return other * expected + (arrived - other * weights)
 
 
 def _seen_in_all(every: Float64, expected: Float64, arrived: Float64) -> Float64:

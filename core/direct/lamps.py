@@ -59,6 +59,7 @@ class Light(Protocol):
     sized: bool
     casts_shadow: bool
     round: bool
+    even: bool
     each: tuple[str, ...]
     kind: tuple[object, ...]
 
@@ -67,6 +68,8 @@ class Light(Protocol):
     def aim(self, points: Float32, unit: Float32) -> Ways: ...
 
     def gain(self, points: Float32, ways: Ways) -> Float32 | None: ...
+
+    def only(self, chosen: NDArray[np.int64]) -> Light: ...
 
 
 Lights = TypeVar("Lights", bound=Light)
@@ -128,6 +131,7 @@ class Ball:
     """
 
     round = True
+    even = True
     #: What there is one of for each lamp.
     each: tuple[str, ...] = ("position", "radius")
 
@@ -166,6 +170,10 @@ class Ball:
     def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
+    def only(self, chosen: NDArray[Any]) -> Light:
+        """The lamps of the chosen points, where there is one for each point."""
+        return self if self.position.ndim == 1 else some_of(self, chosen)
+
     def _towards(self, points: Float64) -> tuple[Float64, ...]:
         """Components (n,) of the ways from points (n, 3) to the middle of the lamp."""
         return tuple(self.position[..., k] - points[:, k] for k in range(3))
@@ -182,6 +190,7 @@ class Ball:
 class Spot(Ball):
     """A ball behind a cone with a smooth edge."""
 
+    even = False
     each = (*Ball.each, "inverse_axes", "cosine", "softness", "widening")
 
     def __init__(self, lamp: SpotLamp, space: Space) -> None:
@@ -219,6 +228,7 @@ class Sun:
     """Parallel light from a disc in the sky."""
 
     round = True
+    even = True
     each: tuple[str, ...] = ()
     kind: tuple[object, ...] = ()
 
@@ -252,6 +262,9 @@ class Sun:
     def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - it shines evenly
         return None
 
+    def only(self, chosen: NDArray[Any]) -> Light:  # noqa: ARG002 - it is the same for all points
+        return self
+
 
 class Panel:
     """A flat convex polygon that emits alike over its area: an area lamp, or a triangle of an emitting surface.
@@ -278,6 +291,7 @@ class Panel:
         self.color = np.pi * radiance
         self.two_sided = two_sided
         self.half_spread = spread / 2
+        self.even = bool(self.half_spread >= np.pi / 2 - 1e-6)
         self.sized = True
         self.casts_shadow = casts_shadow
         fan = np.cross(corners[1:-1] - corners[0], corners[2:] - corners[0]).sum(axis=0)
@@ -291,7 +305,7 @@ class Panel:
         square = abs(first @ second) < 1e-6 * np.linalg.norm(first) * np.linalg.norm(second)
         self._rectangular = bool(len(corners) >= 4 and square)
         #: What panels have in common that are asked as one.
-        alike = self.round, self._rectangular, two_sided, casts_shadow, self._is_even()
+        alike = self.round, self._rectangular, two_sided, casts_shadow, self.even
         self.kind: tuple[object, ...] = (len(corners), *alike)
 
     @classmethod
@@ -374,16 +388,13 @@ class Panel:
     def gain(self, points: Float32, ways: Ways) -> Float32 | None:  # noqa: ARG002 - all that counts is the way
         """The lamp's grid lets pass what lies within half the spread of its axis, less and less towards that angle:
         (tan h - tan a) / (tan h - h), as Cycles does it, a being the angle off the axis and h half the spread."""
-        if self._is_even():
+        if self.even:
             return None
         cosine = np.abs(self._along_normal(ways.towards)) * ways.inverse
         half = np.asarray(self.half_spread)
         edge, rest = np.tan(half).astype(np.float32), (np.tan(half) - half).astype(np.float32)
         tangent = np.sqrt(np.maximum(1 - cosine**2, 0)) / np.maximum(cosine, 1e-9)
         return np.maximum(edge - tangent, 0) / rest
-
-    def _is_even(self) -> bool:
-        return bool(np.all(np.asarray(self.half_spread) >= np.pi / 2 - 1e-6))
 
     def _axes(self) -> list[Float64]:
         return [self.axes[..., number, :] for number in range(3)]

@@ -49,8 +49,9 @@ class Window(Panel):
         super().__init__(name, portal.corners, np.zeros(3), two_sided=False)
         self._sky = sky
         self._before = [other for other in before if portal.may_be_crossed_with(other)]
-        self._even = sky.light.shape[1] == 1
-        self.color = sky.irradiance[0] if self._even else sky.light.mean(axis=0).astype(np.float64)
+        self._one_colour = sky.light.shape[1] == 1
+        self.even = self._one_colour and not self._before
+        self.color = sky.irradiance[0] if self._one_colour else sky.light.mean(axis=0).astype(np.float64)
 
     def aim(self, points: Float32, unit: Float32) -> Ways:
         ways = super().aim(points, unit)
@@ -61,7 +62,7 @@ class Window(Panel):
         """The sky's radiance along the ways relative to its mean, (r, n) or channel by channel (3, r, n)."""
         own = [~other.crossed(points[:, None], ways.towards) for other in self._before]
         alone = np.logical_and.reduce(own).astype(np.float32) if own else None
-        if self._even:
+        if self._one_colour:
             return alone
         directions = (ways.towards * ways.inverse).reshape(3, -1).T
         light = self._sky.light[self._sky.texel(directions)].T.reshape(ways.towards.shape)

@@ -13,7 +13,7 @@ from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.effects import MOST_PANELS
 from radiosity_baker.core.patches import Space, unit_space
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SunLamp, Surface
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Scene, SpotLamp, SunLamp, Surface
 from radiosity_baker.core.visibility import Visibility
 
 UNIT = Space(np.zeros(3), 1.0)
@@ -22,6 +22,10 @@ PANEL = AreaLamp("panel", (0, 0, 0.8), (0.2, 0, 0), (0, 0.2, 0), (0, 0, -1), (1.
 POINT = PointLamp("point", (0, 0, 0.8), (1.0, 2.0, 4.0))
 BALL = PointLamp("ball", (0, 0, 0.8), (1.0, 2.0, 4.0), radius=0.2)
 SUN = SunLamp("sun", (0, 0, -1), (1.0, 2.0, 4.0), angle=0.3)
+#: The ground below lies at the edge of its cone; and at the edge of what its grid lets pass.
+TILTED = ((0.8, 0.0, 0.6), (0.0, 1.0, 0.0), (-0.6, 0.0, 0.8))
+EDGE = SpotLamp("edge", (0, 0, 0.8), (1.0, 2.0, 4.0), TILTED, cone_angle=1.4, blend=0.2, radius=0.1)
+GRID = AreaLamp("grid", (0.4, 0, 0.8), (0.2, 0, 0), (0, 0.2, 0), (0, 0, -1), (1.0, 2.0, 4.0), spread=1.0)
 
 
 def behind(build, lamps, *objects, points=((0, 0, 0),), rays=4, tries=COUNT, normal=(0, 0, 1), shading=None, seed=1):
@@ -85,6 +89,28 @@ def test_what_is_seen_of_a_large_near_lamp_is_the_light_of_that_part(build, rays
     truth = behind(build, [rest], tries=1).irradiance[0, 0]
     seen = behind(build, [lamp], sail, rays=rays).irradiance[:, 0]
     assert abs(seen.mean() - truth) <= 4 * seen.std() / np.sqrt(COUNT) + 1e-3 * truth
+
+
+@pytest.mark.parametrize("lamp", [EDGE, GRID], ids=lambda lamp: lamp.name)
+@pytest.mark.parametrize("open_sky", [True, False], ids=["open", "half hidden"])
+def test_where_a_lamp_shines_unevenly_light_is_right_on_average_and_its_variance_true(build, lamp, open_sky):
+    sails = [] if open_sky else [half_sail(build)]
+    many = behind(build, [lamp], *sails, rays=2048, tries=200).irradiance[:, 0]
+    seen = behind(build, [lamp], *sails)
+    error = np.sqrt(seen.irradiance[:, 0].var() / COUNT + many.var() / 200)
+    assert error > 0
+    assert abs(seen.irradiance[:, 0].mean() - many.mean()) <= 4 * error
+    stated, true = seen.variance[:, 0], (seen.irradiance[:, 0] - seen.irradiance[:, 0].mean()) ** 2
+    assert abs(stated.mean() - true.mean()) <= 4 * np.sqrt(stated.var() + true.var()) / np.sqrt(COUNT)
+
+
+@pytest.mark.parametrize("lamp", [EDGE, GRID], ids=lambda lamp: lamp.name)
+def test_where_nothing_hides_a_lamp_the_edge_of_its_light_is_not_left_to_the_rays(build, lamp):
+    """Eight places for each ray tell of it: even an eighth of the variance would be what chance leaves of that many."""
+    light, points = place(lamp, UNIT), np.zeros((3, COUNT), dtype=np.float32)
+    ways = light.aim(points, np.random.default_rng(1).random((2, 4, COUNT), dtype=np.float32))
+    by_rays = (ways.towards[2] * ways.inverse * ways.solid * light.gain(points, ways)).mean(axis=0)
+    assert behind(build, [lamp]).irradiance[:, 0].var() < by_rays.var() / 8
 
 
 def test_a_quarter_behind_two_sails(build):
