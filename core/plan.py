@@ -441,5 +441,5 @@ def gather_rays(error: float, cells: int = 0) -> int:
     cells: that there are at least; where they are more than usual their neighbours make up for rays.
     """
     dense = max(cells / _TYPICAL_CELLS, 1.0)
-    fewest = 3 if dense < _DENSE else 2
-    return int(2 ** np.clip(np.rint(np.log2(32 * (0.02 / error) ** 2 / dense ** (2 / 3))), fewest, 6))
+    fewest = 4 if dense < _DENSE else 2
+    return int(2 ** np.clip(np.rint(np.log2(64 * (0.02 / error) ** 2 / dense ** (2 / 3))), fewest, 6))
