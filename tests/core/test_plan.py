@@ -331,10 +331,15 @@ def test_planning_changes_nothing(build):
     assert np.isfinite(first.seconds)
 
 
-@pytest.mark.parametrize(("error", "rays"), [(0.1, 16), (0.05, 16), (0.03, 32), (0.02, 64), (0.001, 64)])
-def test_noise_falls_with_the_root_of_the_rays(error, rays):
-    """Half the error takes four times the rays; the fewest cost next to nothing, more than the most are passes."""
+@pytest.mark.parametrize(("error", "rays"), [(0.1, 16), (0.05, 32), (0.02, 32), (0.014, 64), (0.001, 64)])
+def test_small_scenes_have_rays_while_they_cost_next_to_nothing(error, rays):
     assert gather_rays(error) == rays
+
+
+@pytest.mark.parametrize(("error", "rays"), [(0.05, 4), (0.02, 8), (0.01, 32), (0.005, 64)])
+def test_noise_falls_with_the_root_of_the_rays(error, rays):
+    """In large scenes half the error takes four times as many; more than the most are passes."""
+    assert gather_rays(error, 200_000) == rays
 
 
 def finely_modelled(scene, edge):
