@@ -29,7 +29,7 @@ _VARIATION = 0.5
 #: Standard deviations by which the largest and the smallest of some points must differ to mean a variation.
 _SIGNIFICANT = 4.0
 _SHADOW_RAYS = 4
-_CHUNK = 256
+_CHUNK = 2048
 
 
 def patches_by_light(

@@ -24,7 +24,7 @@ from .visibility import Visibility
 
 #: The two independent solutions, by the names of their streams of random numbers.
 HALVES = "first half", "second half"
-_CHUNK = 1024
+_CHUNK = 2048
 
 
 @dataclass(frozen=True, eq=False)

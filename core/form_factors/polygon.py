@@ -20,7 +20,7 @@ from ..scene import Float64
 _ON_HORIZON = 1e-7
 _TINY = 1e-300
 #: Results per pass: intermediate arrays then stay in the processor's cache.
-_CHUNK = 8192
+_CHUNK = 16384
 
 Components = tuple[Float64, Float64, Float64]
 
