@@ -5,6 +5,8 @@ Statistics are asked to lie within four standard deviations.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -111,6 +113,16 @@ def test_where_nothing_hides_a_lamp_the_edge_of_its_light_is_not_left_to_the_ray
     ways = light.aim(points, np.random.default_rng(1).random((2, 4, COUNT), dtype=np.float32))
     by_rays = (ways.towards[2] * ways.inverse * ways.solid * light.gain(points, ways)).mean(axis=0)
     assert behind(build, [lamp]).irradiance[:, 0].var() < by_rays.var() / 8
+
+
+@pytest.mark.parametrize("lamp", [EDGE, GRID], ids=lambda lamp: lamp.name)
+def test_many_uneven_lamps_bring_what_they_bring_one_by_one(build, lamp):
+    field = "center" if lamp is GRID else "position"
+    places = np.random.default_rng(0).uniform(-0.3, 0.3, (30, 2))
+    lamps = [replace(lamp, **{field: (x, y, 0.8)}) for x, y in places]
+    together = behind(build, lamps, tries=500).irradiance[:, 0]
+    alone = np.sum([behind(build, [one], rays=256, tries=500).irradiance[:, 0] for one in lamps], axis=0)
+    assert abs(together.mean() - alone.mean()) <= 4 * np.sqrt((together.var() + alone.var()) / 500)
 
 
 def test_a_quarter_behind_two_sails(build):
