@@ -15,7 +15,7 @@ from ..scene import Bool, Float32, Float64
 from ..visibility import OFFSET, Visibility, offset_along
 from .crowd import Crowd
 from .emitter_tree import EmitterTree
-from .lamps import Light
+from .lamps import Light, Ways
 
 #: A light this far under the brightest one at a point, relatively, is not worth a shadow ray there.
 _NEGLIGIBLE = 1e-7
@@ -167,10 +167,8 @@ class DirectLight:
             ask = np.arange(len(points)) if asked is None else np.flatnonzero(asked >> number & 1)
             if not light.casts_shadow or not len(ask):
                 continue
-            rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
             own = receivers.only(ask)
-            ways = light.aim(own.along[0], np.repeat(rim, len(ask), axis=2))
-            gain = light.gain(own.along[0], ways)
+            ways, gain = _at_rim(light, own.along[0])
             lit = (ways.solid if gain is None else ways.solid * gain.reshape(-1, *ways.solid.shape).max(axis=0)) > 0
             lit &= (ways.towards * own.along[1][:, None]).sum(axis=0) > 0
             hidden = np.zeros(lit.shape, dtype=bool)
@@ -185,19 +183,15 @@ class DirectLight:
         # Two independent halves of the ways: how much they differ is how far their mean can be trusted.
         halves, per_half = (2, max(1, rays // 2)) if light.sized else (1, 1)
         look = self._look(light, receivers, _lattices(halves, per_half, len(share), rng))
-
-        def of_halves(values: Float32) -> Float32:
-            return values.reshape(-1, halves, per_half, len(share)).mean(axis=2)
-
-        arrived = of_halves(look.arrived)
-        expected, weights = (np.broadcast_to(v, arrived.shape) for v in (share, of_halves(look.weights)))
+        arrived = _means(look.arrived, halves)
+        expected, weights = (np.broadcast_to(v, arrived.shape) for v in (share, _means(look.weights, halves)))
         uneven = _unevenly_lit(light, receivers)
         if len(uneven):
             expected, weights = expected.copy(), weights.copy()
             places = _lattices(halves, _PLACES, len(uneven), rng)
             sent = _share_sent(light.only(uneven), receivers.only(uneven), places, halves)
             expected[:, :, uneven] = share[uneven] * sent
-            weights[:, :, uneven] = of_halves(look.sent)[:, :, uneven]
+            weights[:, :, uneven] = _means(look.sent, halves)[:, :, uneven]
         # (halves, n, 1), or one for each channel.
         seen = np.stack([_seen(*channel) for channel in zip(expected, weights, arrived, strict=True)], axis=2)
         whole = look.clear.all(axis=0)
@@ -256,7 +250,7 @@ class DirectLight:
         passed = np.zeros((3, *bright.shape), dtype=np.float32)
         free, tint, cast = self._trace(tally.receivers, shots.towards, sample, point)
         passed[:, sample, point] = free if tint is None else tint
-        seen = (shots.brings * passed).reshape(3, 2, rays, count).mean(axis=2).transpose(1, 2, 0).astype(np.float64)
+        seen = _means(shots.brings * passed, 2).transpose(1, 2, 0).astype(np.float64)
         tally.irradiance += seen.mean(axis=0)
         tally.variance += (seen[0] - seen[1]) ** 2 / 4.0
         tally.partly |= (passed > 0).any(axis=(0, 1)) & (bright & (passed < 1)).any(axis=(0, 1))
@@ -339,19 +333,28 @@ def _unevenly_lit(light: Light, receivers: _Receivers) -> NDArray[np.int64]:
     ends, or behind a window that the sky shines through."""
     if light.even:
         return np.zeros(0, dtype=np.int64)
-    points, outer = receivers.along[0], _RIM if light.round else _CORNERS
-    ways = light.aim(points, np.repeat(outer[:, :, None], points.shape[1], axis=2))
-    gains = cast(Float32, light.gain(points, ways))
-    return np.flatnonzero((np.ptp(gains.reshape(-1, *ways.inverse.shape), axis=1) > 0).any(axis=0))
+    ways, gain = _at_rim(light, receivers.along[0])
+    return np.flatnonzero((np.ptp(cast(Float32, gain).reshape(-1, *ways.inverse.shape), axis=1) > 0).any(axis=0))
+
+
+def _at_rim(light: Light, points: Float32) -> tuple[Ways, Float32 | None]:
+    """Ways from points (3, n) to the outer places of a light, or to the one it has; and its gain along them."""
+    rim = (_RIM if light.round else _CORNERS)[:, : None if light.sized else 1, None]
+    ways = light.aim(points, np.repeat(rim, points.shape[1], axis=2))
+    return ways, light.gain(points, ways)
 
 
 def _share_sent(light: Light, receivers: _Receivers, unit: Float32, halves: int) -> Float32:
     """How much of what an even light would send a light does, (k, h, n), by what each half of some places sends."""
     _, weights, sent = _without_occluders(light, receivers, unit)
-    even, own = (
-        values.reshape(-1, halves, len(unit[0]) // halves, unit.shape[2]).mean(axis=2) for values in (weights, sent)
-    )
+    even, own = _means(weights, halves), _means(sent, halves)
     return np.divide(own, even, out=np.zeros_like(own), where=even > 0)
+
+
+def _means(values: Float32, halves: int) -> Float32:
+    """Means (k, halves, n) over each half of the ways (k, r, n), or (r, n) where k is one."""
+    ways, points = values.shape[-2:]
+    return values.reshape(-1, halves, ways // halves, points).mean(axis=2)
 
 
 def _seen(expected: Float64, weights: Float32, arrived: Float32) -> Float64:
