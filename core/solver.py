@@ -20,6 +20,8 @@ _WATCHED_PASSES = 2
 _MAXIMUM_ITERATIONS = 200
 #: A relative error that rounding leaves.
 _SOLVED = 1e-12
+#: Of the brightest side's light: a room by candlelight beside what the sun brings to the roof above it.
+_DIMMEST = 1e-6
 #: Former directions that a new one is made independent of.
 _REMEMBERED = 12
 
@@ -56,7 +58,7 @@ def shoot_until(
     With rows that sum to more than one the light may grow for ever; after the last allowed pass it stands as it is.
     """
     for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
-        left = _relative(residual, accumulated)
+        left = _relative(residual, accumulated, tolerance)
         if left <= tolerance or done == _MAXIMUM_ITERATIONS:
             break
     return Solution(accumulated, done, left)
@@ -73,7 +75,8 @@ def contraction(factors: Rows, albedo: Float64) -> float:
 def solve(
     exchange: Rows, area: Float64, albedo: Float64, direct: Float64, tolerance: float, workers: Workers | None = None
 ) -> Solution:
-    """Irradiance H (s, c) of each side, to a relative error of at most `tolerance` of each channel's largest.
+    """Irradiance H (s, c) of each side, to a relative error of at most `tolerance` of each channel's largest, and
+    until what is left at each side is as small beside the side's own light.
 
     exchange: symmetric exchange areas G_ij = A_i F_ij; area (s,); albedo, direct (s, c). With z = sqrt(albedo) H the
     system (A - s G s) z = s A E is symmetric and positive definite, and conjugate gradients finish what shooting began.
@@ -82,7 +85,7 @@ def solve(
     q = contraction(factors, albedo)
     for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
         # Nowhere does a later pass bring more than q times the pass before it: the rest of the series is geometric.
-        bound = _relative(residual * q, accumulated) / max(1.0 - q, 1e-12)
+        bound = _relative(residual * q, accumulated, tolerance) / max(1.0 - q, 1e-12)
         if bound <= tolerance:
             return Solution(accumulated, done, bound)
         if done == _WATCHED_PASSES:
@@ -125,7 +128,7 @@ def _conjugate_gradients(
         direction = preconditioned + fresh / np.maximum(energy, np.finfo(float).tiny) * direction
         energy = fresh
         # One more pass would move the reflected light, root z, by root times the scaled residual.
-        bounds = _relative_by_channel(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
+        bounds = _relative_by_channel(root * preconditioned, root * z, tolerance) / max(1.0 - q, 1e-12)
     irradiance = direct + factors.apply(root * z, workers)
     return Solution(irradiance, _WATCHED_PASSES + iteration, float(bounds.max()))
 
@@ -146,7 +149,7 @@ def solve_both_sides(
     former: list[tuple[Float64, Float64, Float64]] = []
     iteration = 0
     while True:
-        bound = _relative(residual, accumulated) / max(1.0 - q, 1e-12)
+        bound = _relative(residual, accumulated, tolerance) / max(1.0 - q, 1e-12)
         if bound <= tolerance or iteration == _MAXIMUM_ITERATIONS:
             return Solution(accumulated, iteration, bound)
         iteration += 1
@@ -161,11 +164,17 @@ def solve_both_sides(
         former = [*former[1 - _REMEMBERED :], (direction, image, energy)]
 
 
-def _relative(change: Float64, whole: Float64) -> float:
-    """The largest change (s, c) of any side, relative to the channel's largest value."""
-    return float(_relative_by_channel(change, whole).max())
+def _relative(change: Float64, whole: Float64, tolerance: float) -> float:
+    """The largest change (s, c) of any side, relative to its own light; see `_relative_by_channel`."""
+    return float(_relative_by_channel(change, whole, tolerance).max())
 
 
-def _relative_by_channel(change: Float64, whole: Float64) -> Float64:
-    scale = np.maximum(np.abs(whole).max(axis=0), np.finfo(float).tiny)
-    return np.asarray(np.abs(change).max(axis=0) / scale)
+def _relative_by_channel(change: Float64, whole: Float64, tolerance: float) -> Float64:
+    """Relative to each side's own light, not to the brightest: a room is solved however bright the day is outside.
+
+    Sides much darker than the brightest count as if they had a share of its light: _DIMMEST, or more where rounding
+    would leave more than `tolerance` of it.
+    """
+    light = np.abs(whole)
+    dimmest = np.maximum(light.max(axis=0) * min(max(_DIMMEST, _SOLVED / tolerance), 1.0), np.finfo(float).tiny)
+    return np.asarray((np.abs(change) / np.maximum(light, dimmest)).max(axis=0))

@@ -14,7 +14,7 @@ from radiosity_baker.core.patches import triangle_geometry
 from radiosity_baker.core.pilot import Pilot, look_for_sky
 from radiosity_baker.core.plan import plan
 from radiosity_baker.core.result import BakedObject
-from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, Surface
+from radiosity_baker.core.scene import AreaLamp, PointLamp, Portal, Scene, SunLamp, Surface
 from radiosity_baker.core.settings import Settings
 
 WHITE = Surface("white", (0.5, 0.5, 0.5))
@@ -143,8 +143,8 @@ def reason_for(scene: Scene, name: str, **asked) -> tuple[bool, str]:
 
 
 def test_a_closed_room_has_no_sky_and_says_so(build):
-    """And leaving it out changes nothing, for no ray finds it, but where solvers stop and where rounding decides who
-    looks longer: less than noise does."""
+    """And leaving it out changes nothing, for no ray finds it, but where solvers stop and where that decides who looks
+    longer and how strongly neighbours are smoothed: less than noise does."""
     scene = closed(build)
     assert reason_for(scene, "sky") == (False, "every ray that leaves a receiver hits something")
     settings = Settings(size=1.0, error=None, threads=1)
@@ -154,6 +154,16 @@ def test_a_closed_room_has_no_sky_and_says_so(build):
     noise = forced.report.estimated_error["sampling"] * same.mean()
     assert np.abs(shown - same).max() <= noise
     assert np.median(np.abs(shown - same)) <= noise / 100
+
+
+@pytest.mark.parametrize("bright", [1.0, 1e4])
+def test_a_sun_outside_changes_nothing_in_a_closed_room(build, bright):
+    """However much brighter the roof is than the room: the bounces inside are solved to the end."""
+    lit = closed(build, sky=(0.0, 0.0, 0.0))
+    sun = SunLamp("sun", (0.3, 0.2, -1.0), (bright,) * 3)
+    night, day = (bake(s, Settings(size=1.0, threads=1)) for s in (lit, replace(lit, lamps=(LAMP, sun))))
+    dark, same = (mean_radiance(r.objects[0]) for r in (night, day))
+    assert same == pytest.approx(dark, rel=day.report.estimated_error["total"])
 
 
 def test_a_sky_that_only_other_surfaces_see_is_not_left_out(build):
