@@ -20,8 +20,8 @@ _WATCHED_PASSES = 2
 _MAXIMUM_ITERATIONS = 200
 #: A relative error that rounding leaves.
 _SOLVED = 1e-12
-#: Of the brightest side's light: a room by candlelight beside what the sun brings to the roof above it.
-_DIMMEST = 1e-6
+#: Of the brightest side's light: a dim room (10 lux) beside what the sun brings to the roof above it (100,000 lux).
+_DIMMEST = 1e-4
 #: Former directions that a new one is made independent of.
 _REMEMBERED = 12
 
