@@ -21,6 +21,7 @@ _MAXIMUM_ITERATIONS = 200
 #: A relative error that rounding leaves.
 _SOLVED = 1e-12
 #: Of the brightest side's light: a dim room (10 lux) beside what the sun brings to the roof above it (100,000 lux).
+#: With much less, rounding would leave more than the smallest tolerances allow.
 _DIMMEST = 1e-4
 #: Former directions that a new one is made independent of.
 _REMEMBERED = 12
@@ -28,7 +29,8 @@ _REMEMBERED = 12
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """irradiance (s, c) W/m^2; iterations done; bound: largest relative error that is left, provably."""
+    """irradiance (s, c) W/m^2; iterations done; bound: provably no less than the largest error that is left, relative
+    to the channel's largest irradiance."""
 
     irradiance: Float64
     iterations: int
@@ -58,7 +60,7 @@ def shoot_until(
     With rows that sum to more than one the light may grow for ever; after the last allowed pass it stands as it is.
     """
     for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
-        left = _relative(residual, accumulated, tolerance)
+        left = _relative(residual, accumulated)
         if left <= tolerance or done == _MAXIMUM_ITERATIONS:
             break
     return Solution(accumulated, done, left)
@@ -85,7 +87,7 @@ def solve(
     q = contraction(factors, albedo)
     for done, (accumulated, residual) in enumerate(shoot(factors, albedo, direct, workers)):
         # Nowhere does a later pass bring more than q times the pass before it: the rest of the series is geometric.
-        bound = _relative(residual * q, accumulated, tolerance) / max(1.0 - q, 1e-12)
+        bound = _relative(residual * q, accumulated) / max(1.0 - q, 1e-12)
         if bound <= tolerance:
             return Solution(accumulated, done, bound)
         if done == _WATCHED_PASSES:
@@ -128,7 +130,7 @@ def _conjugate_gradients(
         direction = preconditioned + fresh / np.maximum(energy, np.finfo(float).tiny) * direction
         energy = fresh
         # One more pass would move the reflected light, root z, by root times the scaled residual.
-        bounds = _relative_by_channel(root * preconditioned, root * z, tolerance) / max(1.0 - q, 1e-12)
+        bounds = _relative_by_channel(root * preconditioned, root * z) / max(1.0 - q, 1e-12)
     irradiance = direct + factors.apply(root * z, workers)
     return Solution(irradiance, _WATCHED_PASSES + iteration, float(bounds.max()))
 
@@ -149,7 +151,7 @@ def solve_both_sides(
     former: list[tuple[Float64, Float64, Float64]] = []
     iteration = 0
     while True:
-        bound = _relative(residual, accumulated, tolerance) / max(1.0 - q, 1e-12)
+        bound = _relative(residual, accumulated) / max(1.0 - q, 1e-12)
         if bound <= tolerance or iteration == _MAXIMUM_ITERATIONS:
             return Solution(accumulated, iteration, bound)
         iteration += 1
@@ -164,17 +166,14 @@ def solve_both_sides(
         former = [*former[1 - _REMEMBERED :], (direction, image, energy)]
 
 
-def _relative(change: Float64, whole: Float64, tolerance: float) -> float:
+def _relative(change: Float64, whole: Float64) -> float:
     """The largest change (s, c) of any side, relative to its own light; see `_relative_by_channel`."""
-    return float(_relative_by_channel(change, whole, tolerance).max())
+    return float(_relative_by_channel(change, whole).max())
 
 
-def _relative_by_channel(change: Float64, whole: Float64, tolerance: float) -> Float64:
-    """Relative to each side's own light, not to the brightest: a room is solved however bright the day is outside.
-
-    Sides much darker than the brightest count as if they had a share of its light: _DIMMEST, or more where rounding
-    would leave more than `tolerance` of it.
-    """
+def _relative_by_channel(change: Float64, whole: Float64) -> Float64:
+    """Relative to each side's own light, or _DIMMEST of the brightest side's if that is more: a room is solved however
+    bright the day is outside."""
     light = np.abs(whole)
-    dimmest = np.maximum(light.max(axis=0) * min(max(_DIMMEST, _SOLVED / tolerance), 1.0), np.finfo(float).tiny)
-    return np.asarray((np.abs(change) / np.maximum(light, dimmest)).max(axis=0))
+    scale = np.maximum(np.maximum(light, _DIMMEST * light.max(axis=0)), np.finfo(float).tiny)
+    return np.asarray((np.abs(change) / scale).max(axis=0))

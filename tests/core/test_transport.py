@@ -134,14 +134,14 @@ def test_the_inside_of_a_solid_on_the_ground_stays_dark(build, transport):
     block = build.box("block", (-0.63, -0.41, 0), (0.5, 0.47, 1.2), surface=1)
     surfaces = (build.grey, Surface("block", (0.8, 0.8, 0.8)))
     scene = Scene((ground, block), surfaces, (SunLamp("sun", (0.3, 0.2, -0.9), (3.0, 3.0, 3.0)),), (1.0, 1.0, 1.0))
-    solved = lit(transport, scene, patches=1500)
+    # As many rays as the bounds below were set for: a leak is what the few that find the patches at the rim bring.
+    solved = lit(transport, scene, patches=1500, transport_rays=64)
     inside = solved.sides.back & np.isclose(solved.sides.albedo[:, 0], 0.8)
     outside = ~solved.sides.back & np.isclose(solved.sides.albedo[:, 0], 0.8)
     assert inside.any()
     assert solved.solution.irradiance[outside].mean() > 1
     leaked, usual = solved.solution.irradiance[inside], solved.solution.irradiance[outside].mean()
-    # Solved to the end the worst side in there has 1.13 % of the light outside.
-    assert leaked.max() <= surroundings._DARK / 4 * usual, "so that no point in there is taken for lit"
+    assert leaked.max() <= surroundings._DARK / 5 * usual, "so that no point in there is taken for lit"
     assert leaked.mean() <= 1e-3 * usual
 
 
