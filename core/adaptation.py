@@ -166,7 +166,7 @@ class Adaptation:
         return arriving, enclosed
 
     def _seen(self, around: Surroundings, number: int, points: Points) -> Float64:
-        """Mean irradiance (n,) of what is seen from the points."""
+        """How lit (n,) is what is seen from the points."""
         seen, rays = around.light_in_sight(points, self._seed, number, self._workers)
         self.rays += rays
         return seen

@@ -1,4 +1,4 @@
-"""Finer patches where the light that comes straight from the sources varies inside them.
+"""Patches cut where something stands on them, and finer where the light straight from the sources varies inside them.
 
 A patch sends out one colour, so light that bends inside it matters as much as light that breaks: the floor at the edge
 of a shadow, and the shade around a bulb.
@@ -13,13 +13,14 @@ import numpy as np
 from .direct.illumination import DirectLight, Source
 from .form_factors.sides import SITES, site_points
 from .parallel import Workers
+from .patch_contacts import cut_at_contacts, parted
 from .patches import Patches, PatchMeshes, Space, make_patches, split_objects
 from .pilot import Pilot
 from .plan import Effort
 from .sampling import stream
 from .scene import Bool, Float64, Scene
 from .splitting import over_fair_share
-from .tessellation import Int64, split_triangles
+from .tessellation import Int64, split_each, split_triangles
 from .visibility import Visibility
 
 #: How often a patch is split into four at most, and how many times as many patches there may be in the end.
@@ -35,12 +36,16 @@ _CHUNK = 2048
 def patches_by_light(
     scene: Scene, space: Space, lights: list[Source], effort: Effort, seed: int, workers: Workers, pilot: Pilot
 ) -> tuple[Patches, Visibility]:
-    """About effort.patches patches, and more where direct light varies; and what is visible among them."""
+    """About effort.patches patches, and more at contacts and where direct light varies; and what is visible among
+    them."""
     split = split_objects(scene, effort.patches)
     patches = make_patches(scene, space, split, pilot.like(space, split))
     visibility = pilot.visibility_for(patches)
     light = DirectLight(lights, visibility, seed, effort.lights)
     triangles = len(patches.area)
+    whole, split = split, cut_at_contacts(split, patches, visibility)
+    if split is not whole:
+        patches = make_patches(scene, space, split)
     fresh, fair = np.arange(len(patches)), 0.0
     for level in range(_LEVELS if lights else 0):
         mean, variation = _light_inside(patches, fresh, light, seed, level, workers)
@@ -54,6 +59,7 @@ def patches_by_light(
         patches = make_patches(scene, space, split, patches if split.same_triangles(before) else None)
         fresh = np.unique(patches.patch[changed[patches.triangle]])
     # Patches of dense meshes get finer by fewer triangles each: the same triangles meet the rays.
+    patches = replace(patches, parted=parted(patches, visibility))
     return patches, visibility if len(patches.area) == triangles else Visibility(patches.corners, patches.optics)
 
 
@@ -93,16 +99,6 @@ def _refined(split: PatchMeshes, patches: Patches, uneven: Int64) -> tuple[Patch
     halvings[grouped] += 1
     changed[grouped] = True
     marked[patches.triangle[(chosen & (members == 1))[patches.patch]]] = True
-    ends = np.cumsum([0, *(len(m.triangles) for m in split.meshes)])
-    meshes, sources = [], []
-    for mesh, begin, end in zip(split.meshes, ends[:-1], ends[1:], strict=True):
-        if not marked[begin:end].any():
-            meshes.append(mesh)
-            sources.append(np.arange(begin, end))
-            continue
-        finer, source = split_triangles(mesh, marked[begin:end])
-        meshes.append(finer)
-        sources.append(source + begin)
-    source = np.concatenate(sources)
+    meshes, source = split_each(split.meshes, marked, split_triangles)
     several = np.bincount(source, minlength=len(halvings)) > 1
-    return replace(split, meshes=tuple(meshes), halvings=halvings[source]), (changed | several)[source]
+    return replace(split, meshes=meshes, halvings=halvings[source]), (changed | several)[source]

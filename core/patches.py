@@ -67,7 +67,8 @@ class Patches:
     patch, from first (p + 1,) on. patch_area (p,), surface (p,) into Scene.surfaces, albedo (p, 3), emission (p, 3)
     radiance W/(m^2 sr). transmission (p, 3): share that leaves on the other side, None if nothing transmits. optics:
     where rays go on, None if nowhere; then a patch's light is that of the share of it where rays stop: coverage (p,),
-    None if that is all of it. one_sided (p,): patches whose back emits nothing; None if there are none.
+    None if that is all of it. one_sided (p,): patches whose back emits nothing; None if there are none. parted
+    (p,): those that something stands between and the largest of their coarser group; None if nobody has looked.
     """
 
     space: Space
@@ -86,6 +87,7 @@ class Patches:
     optics: Optics | None = None
     coverage: Float64 | None = None
     one_sided: Bool | None = None
+    parted: Bool | None = None
 
     def emission_of(self, side: Int32) -> Float32:
         """Radiance (..., 3) that sides emit: patch numbers (...) for fronts, those plus the number of patches for
@@ -99,20 +101,28 @@ class Patches:
     def __len__(self) -> int:
         return len(self.patch_area)
 
-    @cached_property
-    def coarser_groups(self) -> Int32:
-        """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
-        become one: those whose centres lie in one cube of a grid, each side of it as large as four of them."""
+    @property
+    def centres(self) -> tuple[Float64, Float64]:
+        """The centre (p, 3) of each patch, and the mean (p, 3) of its triangles' normals, by area."""
         weight = self.area / self.patch_area[self.patch]
         centres = (self.corners[:, 0] + self.corners[:, 1] + self.corners[:, 2]) / 3.0
         center, facing = (
             np.stack([np.bincount(self.patch, weight * values[:, k], len(self)) for k in range(3)], axis=1)
             for values in (centres, self.normals)
         )
+        return np.asarray(center), np.asarray(facing)
+
+    @cached_property
+    def coarser_groups(self) -> Int32:
+        """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
+        become one: those whose centres lie in one cube of a grid, each side of it as large as four of them, with
+        nothing that parts them."""
+        center, facing = self.centres
         median = np.median(self.patch_area)
         level = np.rint(np.log2(self.patch_area / median) / 2.0)[:, None]
         edge = 2.0 * np.sqrt(median) * 2.0**level
-        key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), self.surface])
+        parted = np.zeros(len(self)) if self.parted is None else self.parted
+        key = np.column_stack([np.floor(center / edge), level, np.rint(facing * 1.5), self.surface, parted])
         return distinct(row_numbers(key.astype(np.int64)))[2].astype(np.int32)
 
     @property

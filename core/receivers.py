@@ -20,6 +20,7 @@ from .tessellation import (
     cut_edges,
     edge_for_count,
     edge_keys,
+    split_each,
     split_triangles,
     triform,
     whole,
@@ -249,17 +250,10 @@ def _split_each(
     split_mesh: Callable[[Tessellation, NDArray[Any]], tuple[Tessellation, Int64]],
 ) -> tuple[Receivers, Int64]:
     """Split the mesh of each receiver where (c, ...) it says for its cells."""
-    fine, sources, begin = [], [], 0
-    for mesh in receivers.fine:
-        end = begin + len(mesh.triangles)
-        split, source = split_mesh(mesh, where[begin:end])
-        fine.append(split)
-        sources.append(source + begin)
-        begin = end
-    source = np.concatenate(sources)
+    fine, source = split_each(receivers.fine, where, split_mesh)
     split_receivers = lay_out(
         receivers.objects,
-        fine,
+        list(fine),
         receivers.space,
         receivers.cells.front,
         tessellate=receivers.tessellated,

@@ -23,8 +23,11 @@ from .visibility import Visibility
 #: A point that gets less than this share of the mean light is dark; where something is nearer than this share of its
 #: cell's size, one that gets less than half.
 _DARK, _DIM, GAP = 0.05, 0.5, 0.25
-#: What gets this share of the mean light is not the inside of a solid, whichever way it faces.
+#: Where what is seen is this lit in the mean, or more, nobody is inside a solid, whichever way its surface faces.
 _LIT = 0.25
+#: Standard deviations by which light must differ from none. Two are what the few points of a side in the dark may give,
+#: where the plane of a side cuts a lamp.
+_SIGNIFICANT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +38,9 @@ class Surroundings:
     one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
-    lit (codes, 1): mean irradiance of what a ray meets, however dark its colour is. level_doubts: by what share of
-    itself each half may misjudge all reflected light, by its rays and by larger patches.
+    lit (codes, 1): how lit is what a ray meets, however dark its colour: 1 where the sources reach it, elsewhere its
+    irradiance as a share of the mean. level_doubts: by what share of itself each half may misjudge all reflected light,
+    by its rays and by larger patches.
     """
 
     hemispheres: Hemispheres
@@ -60,7 +64,7 @@ class Surroundings:
         return arriving @ self.to_grey, enclosed, rays
 
     def light_in_sight(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Counter[str]]:
-        """Mean irradiance (n,) of what is seen from the points, and the rays it took."""
+        """How lit (n,) is what is seen from the points, in the mean, and the rays it took."""
         seen, _, _, rays = gather_indirect(points, self.hemispheres, self.lit, seed, number, workers)
         return seen[:, 0], rays
 
@@ -94,7 +98,11 @@ def look_up(
 
 
 def _lit(half: Transport, sky: Sky) -> Float32:
-    met = half.by_code(half.solution.irradiance.mean(axis=1, keepdims=True))
+    arriving = half.solution.irradiance.mean(axis=1)
+    mean = half.sides.area @ arriving / half.sides.area.sum()
+    # What the sources reach is lit however bright others are: a room may lie beside a street in the sun.
+    reached = half.incoming.mean(axis=1) > _SIGNIFICANT * half.noise
+    met = half.by_code(np.where(reached, 1.0, arriving / max(mean, np.finfo(float).tiny))[:, None])
     return np.concatenate([met, np.zeros((len(sky.light), 1), dtype=np.float32)])
 
 
@@ -131,13 +139,13 @@ def out_of_sight(
 
     A room whose normals face outward is all backs too, and a bright gap is seen into: only points that hardly any light
     reaches count, and from which nothing is seen that light reaches, for a shadow in a dark room is in sight.
-    total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total. look: the mean
-    irradiance (n,) of what is seen from some points.
+    total, direct (n,): irradiance, and the part straight from the sources; mean: that of the total. look: how lit
+    (n,) is what is seen from some points.
     """
     hidden = enclosed & dark(total, direct, mean)
     doubtful = np.flatnonzero(hidden)
     if len(doubtful):
-        hidden[doubtful] = look(points.only(doubtful)) <= _LIT * mean
+        hidden[doubtful] = look(points.only(doubtful)) <= _LIT
     dim = np.flatnonzero(~hidden & (total <= _DIM * mean) & (direct <= 0))
     if len(dim):
         hidden[dim] = _in_gap(points, around, dim)

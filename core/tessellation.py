@@ -8,7 +8,9 @@ triangles from getting thinner ("red-green" refinement: Bank, Sherman, Weiser 19
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +75,23 @@ def quarters(corners: Float64) -> Float64:
 def _split_long_edges(mesh: Tessellation, longest_edge: float) -> Tessellation:
     marked = _squared_edges(mesh.vertices, mesh.triangles) > longest_edge * longest_edge
     return _split(mesh, marked)[0]
+
+
+def split_each(
+    meshes: Iterable[Tessellation],
+    where: NDArray[Any],
+    split_mesh: Callable[[Tessellation, NDArray[Any]], tuple[Tessellation, Int64]],
+) -> tuple[tuple[Tessellation, ...], Int64]:
+    """Split each mesh where (t, ...) it says for the triangles of all; and for each new triangle the one it came
+    from."""
+    split, sources, begin = [], [], 0
+    for mesh in meshes:
+        end = begin + len(mesh.triangles)
+        finer, source = split_mesh(mesh, where[begin:end])
+        split.append(finer)
+        sources.append(source + begin)
+        begin = end
+    return tuple(split), np.concatenate(sources)
 
 
 def split_triangles(mesh: Tessellation, chosen: Bool) -> tuple[Tessellation, Int64]:
