@@ -3,6 +3,7 @@
 # make extension   one installable package per platform, in build/extension/
 # make repository  and a listing of them in build/repository/, to put on any web server as an extension repository
 # make test-4.5    the tests on Blender 4.5 as well
+# make test-5.3    the same on Blender 5.3
 # make lint        the style and type checks alone
 # make samples     rebuild the sample scenes from their scripts
 # make accuracy    measure the samples against Cycles, for docs/accuracy.md: takes long
@@ -14,7 +15,7 @@
 # make test-gui    drive a real Blender window (needs one: see tests/gui)
 
 .DEFAULT_GOAL := bake
-.PHONY: bake test test-own test-other test-3.13 test-4.5 lint samples extension repository accuracy bench effects colours fuzz reliability test-gui clean
+.PHONY: bake test test-own test-other test-3.13 test-4.5 test-5.3 lint samples extension repository accuracy bench effects colours fuzz reliability test-gui clean
 
 SAMPLE := sample_blends/cornell_box_area_lamp.blend
 
@@ -49,6 +50,9 @@ test-3.13: .venv-3.13/ready
 
 test-4.5: .venv-4.5/ready
 	.venv-4.5/bin/python $(PYTEST)
+
+test-5.3: .venv-5.3/ready
+	.venv-5.3/bin/python $(PYTEST)
 
 lint: .venv/ready
 	.venv/bin/ruff check --quiet
@@ -105,6 +109,12 @@ test-gui: extension
 	@test -n "$(PYTHON_3.11)" || { echo "This needs Blender 4.5 as a Python module, and so Python 3.11." >&2; exit 2; }
 	test -x .venv-4.5/bin/python || "$(PYTHON_3.11)" -m venv .venv-4.5
 	.venv-4.5/bin/python -m pip install --quiet --disable-pip-version-check 'bpy==4.5.*' --editable '.[dev]'
+	@touch $@
+
+.venv-5.3/ready: pyproject.toml
+	@test -n "$(PYTHON_3.13)" || { echo "This needs Blender 5.3 as a Python module, and so Python 3.13." >&2; exit 2; }
+	test -x .venv-5.3/bin/python || "$(PYTHON_3.13)" -m venv .venv-5.3
+	.venv-5.3/bin/python -m pip install --quiet --disable-pip-version-check 'bpy==5.3.*' --editable '.[dev]'
 	@touch $@
 
 clean:

@@ -1,4 +1,5 @@
-"""Every difference between the supported Blenders, each found by asking for the feature and never for the version."""
+"""Every difference between the supported Blenders, each found by asking for the feature, and for the version only where
+nothing else tells."""
 
 from __future__ import annotations
 
@@ -38,6 +39,15 @@ def lamp_strength(lamp: bpy.types.Light, matrix: Float64) -> RGB:
 def casts_shadow(lamp: bpy.types.Light) -> bool:
     """Whether Cycles lets anything stand in the lamp's light: a setting of Cycles' own at first, of the lamp later."""
     return bool(getattr(getattr(lamp, "cycles", None), "cast_shadow", lamp.use_shadow))
+
+
+def rough_colour(colour: Float64) -> Float64:
+    """What a rough diffuse surface (..., 3) does to the colour of light that leaves it after several bounces on its own
+    microfacets, beside what their number does: once too often before Blender 5.3.
+
+    Measured in furnaces of Cycles 5.0.1, 5.2.3 and 5.3.0, to 1e-4. There is no property to ask for.
+    """
+    return colour if bpy.app.version >= (5, 3, 0) else colour**2
 
 
 def set_corner_normals(mesh: bpy.types.Mesh, normals: Float32) -> None:

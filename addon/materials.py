@@ -18,7 +18,7 @@ import numpy as np
 from mathutils import Matrix
 
 from ..core.scene import ALBEDO_LIMIT, RGB, Float64, Surface, Texture
-from .compat import shader_tree
+from .compat import rough_colour, shader_tree
 from .images import MISSING, Extension, UnreadableImage, has_pixels, read_image
 
 #: What Cycles gives faces without a material: its default Principled BSDF, of which `_principled` makes this.
@@ -481,14 +481,14 @@ def rough_albedo(colour: Float64, roughness: float) -> Float64:
     """Share of even light that Cycles' rough diffuse surface (energy preserving Oren-Nayar) sends along its normal.
 
     colour: (..., 3). From Portsmouth, Kutz, Hill, "EON: a practical energy-preserving rough diffuse BRDF" (2025), which
-    agrees with furnaces in Cycles 5.0.1 to 1e-4. Light from one side only differs: at colour 0.8 and roughness 1 by 5 %
-    when it falls straight on and by 11 % at 80 degrees.
+    agrees with furnaces in Cycles to 1e-4, but for a colour (`compat.rough_colour`). Light from one side only differs:
+    at colour 0.8 and roughness 1 by 5 % when it falls straight on and by 11 % at 80 degrees.
     """
     if roughness <= 0.0:
         return colour
     single = 1.0 / (1.0 + (0.5 - 2.0 / (3.0 * math.pi)) * roughness)
     mean = single * (1.0 + (2.0 / 3.0 - 28.0 / (15.0 * math.pi)) * roughness)
-    multiple = colour**2 * mean / (1.0 - colour * (1.0 - mean))
+    multiple = rough_colour(colour) * mean / (1.0 - colour * (1.0 - mean))
     return np.asarray(colour * (single + (1.0 - single) * multiple))
 
 

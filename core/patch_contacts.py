@@ -30,8 +30,9 @@ _TOWARDS = 0.95
 #: How often pieces are looked at again, and up to how many times as many triangles; and how high, relative to a patch's
 #: edge, a triangle is that is looked at: of slivers rays tell only by chance what stands on them.
 _LEVELS, _GROWTH, _HIGH = 6, 1.5, 0.05
-#: Sine of the angle up to which a way runs along a patch.
-_FLAT = 1e-3
+#: Sine of the angle up to which a way runs along a patch; cosine of the angle from which on a surface does not stand on
+#: another but folds onto it: there rays start beyond it, and meet it from behind.
+_FLAT, _FOLDED = 1e-3, 0.995
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +186,9 @@ def _first_contact(ways: _Ways, patches: Patches, visibility: Visibility) -> Flo
         middle = (low + high) / 2.0
         before = ways.barred(middle, visibility)
         low, high = np.where(before, low, middle), np.where(before, middle, high)
-    # Out of a solid a way meets the back of its surface.
     met = patches.normals[visibility.nearest(*ways.rays(high))]
+    # Out of a solid a way meets the back of its surface.
     leaves = np.einsum("ek,ek->e", met, ways.second - ways.first) > 0.0
-    place[barred] = high + np.where(leaves, -_WITHIN, _WITHIN)
+    stands = np.abs(np.einsum("ek,ek->e", met, ways.normals)) < _FOLDED
+    place[barred] = np.where(stands, high + np.where(leaves, -_WITHIN, _WITHIN), np.nan)
     return place

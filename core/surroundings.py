@@ -39,8 +39,8 @@ class Surroundings:
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
     lit (codes, 1): how lit is what a ray meets, however dark its colour: 1 where the sources reach it, elsewhere its
-    irradiance as a share of the mean. level_doubts: by what share of itself each half may misjudge all reflected light,
-    by its rays and by larger patches.
+    irradiance as a share of the mean, 1 at most. level_doubts: by what share of itself each half may misjudge all
+    reflected light, by its rays and by larger patches.
     """
 
     hemispheres: Hemispheres
@@ -102,7 +102,8 @@ def _lit(half: Transport, sky: Sky) -> Float32:
     mean = half.sides.area @ arriving / half.sides.area.sum()
     # What the sources reach is lit however bright others are: a room may lie beside a street in the sun.
     reached = half.incoming.mean(axis=1) > _SIGNIFICANT * half.noise
-    met = half.by_code(np.where(reached, 1.0, arriving / max(mean, np.finfo(float).tiny))[:, None])
+    share = np.clip(arriving, 0.0, mean) / mean if mean > 0.0 else np.zeros_like(arriving)
+    met = half.by_code(np.where(reached, 1.0, share)[:, None])
     return np.concatenate([met, np.zeros((len(sky.light), 1), dtype=np.float32)])
 
 

@@ -14,13 +14,13 @@ from xml.etree import ElementTree as ET
 
 ROOT = Path(__file__).resolve().parent.parent
 #: Environments as the Makefile names them.
-ENVIRONMENTS = (".venv-4.5", ".venv", ".venv-3.13")
+ENVIRONMENTS = (".venv-4.5", ".venv", ".venv-3.13", ".venv-5.3")
 #: pytest's report of each, and of the program, where tests/gui/cases.py leaves it.
 REPORTS = {name: ROOT / "build" / f"reliability{name}.xml" for name in (*ENVIRONMENTS, ".blender")}
 HEADING = """# What was tried to break it
 
 Written by `make reliability`: the hard cases of [tests/hard_cases](../tests/hard_cases) on each Blender that has an
-environment here as a Python module (`make test` and `make test-4.5` set them up), and in the program itself, with the
+environment here as a Python module (`make test`, `make test-4.5` and `make test-5.3` set them up), and in the program itself, with the
 extension as it is installed (`tests/gui/run --cases`). Exact values come from closed forms; what a result may be off is
 derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever stands in it. Below
 the cases: what random scenes must keep, and which faults are injected, with how often, here and in the last long run
