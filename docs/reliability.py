@@ -20,11 +20,11 @@ REPORTS = {name: ROOT / "build" / f"reliability{name}.xml" for name in (*ENVIRON
 HEADING = """# What was tried to break it
 
 Written by `make reliability`: the hard cases of [tests/hard_cases](../tests/hard_cases) on each Blender that has an
-environment here as a Python module (`make test`, `make test-4.5` and `make test-5.3` set them up), and in the program itself, with the
-extension as it is installed (`tests/gui/run --cases`). Exact values come from closed forms; what a result may be off is
-derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever stands in it. Below
-the cases: what random scenes must keep, and which faults are injected, with how often, here and in the last long run
-(`make fuzz`, on one Blender). `radiosity-baker self-test` prints the closed forms in any Blender.
+environment here as a Python module (`make test`, `make test-4.5` and `make test-5.3` set them up), and in the program
+itself, with the extension as it is installed (`tests/gui/run --cases`). Exact values come from closed forms; what a
+result may be off is derived where the case is defined. A case of the furnace has radiance 2 at every corner, whatever
+stands in it. Below the cases: what random scenes must keep, and which faults are injected, with how often, here and in
+the last long run (`make fuzz`, on one Blender). `radiosity-baker self-test` prints the closed forms in any Blender.
 """
 #: What the long run leaves behind, as tests/hard_cases/conftest.py writes it.
 LONG_RUN = ROOT / "build" / "fuzz.jsonl"
