@@ -104,7 +104,8 @@ def bake(
         sampled, sky_light = told_apart(direct_light, others, of_sky if "sky" in settings.layers else [])
 
         def begun_on(some: Receivers) -> Survey:
-            return Survey(some, sampled, surroundings, effort, settings.seed, workers, sky_light)
+            around = surroundings and surroundings.from_cells(len(some.cells), effort, settings.seed)
+            return Survey(some, sampled, around, effort, settings.seed, workers, sky_light)
 
         with clock.stage("tessellate", 0.28):
             survey, finer = finer_where_it_matters(

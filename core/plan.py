@@ -52,6 +52,8 @@ _TREE_COST = 8
 _TYPICAL_SAMPLING, _TYPICAL_RESOLUTION, _TYPICAL_RAYS, _TYPICAL_CELLS = 0.008, 0.01, 32, 20_000
 #: Share of the asked error that triangles leave which are added where light calls for them: typical too.
 LEFT_TO_TRIANGLES = 0.7
+#: Rays of a sample point, at most, where there are more because cells are few.
+_MOST_RAYS = 128
 #: How many times as many cells as is typical count as dense: then a few rays less of each lose nothing.
 _DENSE = 4.0
 #: Errors that the panel shows the price of.
@@ -99,10 +101,10 @@ class Effort:
     coarsest: with how many times fewer adaptation starts; growth: how many times as many it may add where a size is
     asked for; patches: wanted number; most_patches: up to how many there may be if those leave too much of the error, 0
     for none; transport_rays: of a patch side; shadow_rays: to a lamp with size; lights: asked at a point by each half
-    of the rays where there are too many; gather_rays: of a sample point; passes over all cells before the error is
-    first estimated, boundary_passes over the cells where shadow boundaries leave the light uncertain; tolerance: of the
-    solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting triangles are too many to be
-    lamps; channels: 3, or 1 where everything is grey.
+    of the rays where there are too many; gather_rays: of a sample point, unless cells are few; passes over all cells
+    before the error is first estimated, boundary_passes over the cells where shadow boundaries leave the light
+    uncertain; tolerance: of the solve; threshold: form factor under which pairs are culled; emitters_by_rays: emitting
+    triangles are too many to be lamps; channels: 3, or 1 where everything is grey.
     """
 
     error: float
@@ -127,6 +129,12 @@ class Effort:
     def shadow_rays_of_site(self) -> int:
         """From each of the points of a patch to a lamp: what those miss the others of the same patch find."""
         return max(self.shadow_rays // SITES, 2)
+
+    def rays_of_point(self, cells: float) -> int:
+        """Rays of a sample point on so many cells: gather_rays, and twice or four times as many where cells are so few
+        that these cost next to nothing beside what else a bake does."""
+        doublings = np.clip(np.rint(np.log2(_TYPICAL_CELLS / max(cells, 1.0)) / 2.0), 0, 2)
+        return max(min(self.gather_rays * 2 ** int(doublings), _MOST_RAYS), self.gather_rays)
 
 
 @dataclass(frozen=True)
@@ -359,7 +367,7 @@ class _Prices:
             look = replace(
                 works.get(first, Work()),
                 transport=2 * patches * effort.transport_rays,
-                gather=cells * looks * effort.gather_rays + surveyed * BEND_RAYS,
+                gather=cells * looks * effort.rays_of_point(cells) + surveyed * BEND_RAYS,
                 patches=patches,
             )
             works[first] = look
@@ -378,7 +386,7 @@ class _Prices:
         if self._settings.error is None:
             return effort.passes
         finer = cells / _TYPICAL_CELLS
-        rays = effort.gather_rays / _TYPICAL_RAYS
+        rays = effort.rays_of_point(cells) / _TYPICAL_RAYS
         sampling, rest = _TYPICAL_SAMPLING**2 / finer ** (2 / 3) / rays, _TYPICAL_RESOLUTION**2 / finer
         if effort.coarsest > 1.0 and cells < effort.triangles:
             # Triangles are added until what they leave is what was asked for, and no further.

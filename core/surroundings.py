@@ -39,8 +39,8 @@ class Surroundings:
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
     lit (codes, 1): how lit is what a ray meets, however dark its colour: 1 where the sources reach it, elsewhere its
-    irradiance as a share of the mean, 1 at most. level_doubts: by what share of itself each half may misjudge all
-    reflected light, by its rays and by larger patches.
+    irradiance as a share of the mean, 1 at most; in both halves, for one may not have looked there. level_doubts: by
+    what share of itself each half may misjudge all reflected light, by its rays and by larger patches.
     """
 
     hemispheres: Hemispheres
@@ -55,6 +55,10 @@ class Surroundings:
     def with_rays(self, rays: int, rng: np.random.Generator) -> Surroundings:
         """The same, looked at with another number of rays."""
         return replace(self, hemispheres=self.hemispheres.with_rays(rays, rng))
+
+    def from_cells(self, cells: int, effort: Effort, seed: int) -> Surroundings:
+        """The same, looked at from so many cells with as many rays of each point as that takes."""
+        return self.with_rays(effort.rays_of_point(cells), stream(seed, "gather patterns"))
 
     def look(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Bool, Counter[str]]:
         """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; whether
@@ -85,16 +89,27 @@ def look_up(
     by_rays = channels * effort.emitters_by_rays
     return Surroundings(
         hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"), sky),
-        tables=tuple(_table(half, sky, effort) for half in halves),
+        tables=_completed([_table(half, sky, effort) for half in halves], halves),
         reflected=slice(0, channels),
         sky=slice(channels, channels + seen),
         emitted=slice(channels + seen, channels + seen + by_rays),
         to_grey=np.concatenate(
             [np.full(channels, 1 / channels), sky.irradiance.mean(axis=1), np.full(by_rays, 1 / channels)]
         ),
-        lit=_lit(halves[0], sky),
+        lit=np.minimum.reduce([_lit(half, sky) for half in halves]),
         level_doubts=tuple(half.level_doubts() for half in halves),
     )
+
+
+def _completed(tables: list[Float32], halves: tuple[Transport, ...]) -> tuple[Float32, ...]:
+    """The tables of both halves. A side that only rays of one have met brings in the other what it does there, for a
+    receiver's rays may meet it too."""
+    met = [np.isin(np.arange(2 * len(half.sides.patches)), half.sides.side) for half in halves]
+    completed = [table.copy() for table in tables]
+    for own, other in ((0, 1), (1, 0)):
+        only = np.flatnonzero(met[other] & ~met[own])
+        completed[own][only] = tables[other][only]
+    return tuple(completed)
 
 
 def _lit(half: Transport, sky: Sky) -> Float32:

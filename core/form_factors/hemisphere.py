@@ -71,6 +71,9 @@ def hemisphere_rows(
         name = f"{purpose} {len(looks)}"
         look = _look_around(even_sides(patches, fresh, seed, name), hemispheres, workers, seed, name)
         cast["transport"] += len(fresh) * rays
+        reached = np.zeros(2 * count, dtype=bool)
+        # What points under a solid meet is reached as well: those of receivers may lie there.
+        reached[look.column] = True
         partly, contact = open_parts(look.sides(patches), look.behind, look.met_by, hemispheres, seed, name)
         cast += contact
         if len(partly.side):
@@ -78,7 +81,6 @@ def hemisphere_rows(
             look = _Look.joined([look.without(partly.side), anew])
             cast["transport"] += len(partly.side) * rays
         looks.append(look)
-        reached = np.zeros(2 * count, dtype=bool)
         reached[look.column] = True
         fresh = np.flatnonzero(reached & ~met).astype(np.int32)
         met |= reached
