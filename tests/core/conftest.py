@@ -11,6 +11,7 @@ import pytest
 
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.parallel import Workers
+from radiosity_baker.core.patch_contacts import cut_at_contacts
 from radiosity_baker.core.patches import Patches, make_patches, split_objects, triangle_geometry, unit_space
 from radiosity_baker.core.plan import Effort, choose_effort
 from radiosity_baker.core.progress import Progress
@@ -78,11 +79,16 @@ def workers() -> Iterator[Workers]:
 
 @pytest.fixture
 def transport(workers):
-    """Solve the exchange of light in a scene; lights: what is sampled as lamps."""
+    """Solve the exchange of light in a scene; lights: what is sampled as lamps; cut: patches at contacts, as a bake
+    does."""
 
-    def run(scene: Scene, lights=(), seed=0, purpose="test", **changes) -> Transport:
+    def run(scene: Scene, lights=(), seed=0, purpose="test", *, cut=False, **changes) -> Transport:
         asked = effort(**changes)
         patches = patches_of(scene, asked.patches)
+        if cut:
+            split = split_objects(scene, asked.patches)
+            whole = Visibility(patches.corners)
+            patches = make_patches(scene, unit_space(scene), cut_at_contacts(split, patches, whole))
         visibility = Visibility(patches.corners)
         direct_light = DirectLight(list(lights), visibility, seed)
         sky = Sky.of(scene.sky)
