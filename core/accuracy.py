@@ -142,8 +142,8 @@ def _tried(halves: list[Samples]) -> Float64:
 def cross_validate(
     fit: Fit, halves: list[Samples], area: Float64, shown: Float64, loose: float = 1.0, each: Callable[..., Any] = map
 ) -> Fitted:
-    """The alpha at which, around each vertex, a fit of all samples would best predict others, by how each half of them
-    predicts the other, judged by the mean light; and that light: half of what both halves have.
+    """The alpha at which, around each vertex, each half of the samples best predicts the other, judged by the mean
+    light; and that light: half of what both halves have.
 
     area (c,) of the cells, as far as they are in sight; shown (c,): what a squared error of the light there counts.
     loose: how many times as far as usual fits may be from the best. each: a `map` that may use threads.
@@ -160,10 +160,8 @@ def cross_validate(
         # Where less smoothing was better already, that fit stays. The first one tells how light bends: it is near.
         rough = _ROUGH * (loose if tried else 1.0)
         values = list(each(fit.solve, systems, repeat(alpha), best, repeat(rough), repeat(~smoother)))
-        fitted = _Halves(*_shown(values, limits, alpha, to_grey))
-        predicted = sum(each(fit.squared_residual, grey, (fitted.second, fitted.first))) / 2
-        # The fit of all samples has half the noise of these: by what they spread less, it would gain half as much.
-        predicted = predicted - fitted.spread(fit) / 4.0
+        first, second = _shown(values, limits, alpha, to_grey)
+        predicted = sum(each(fit.squared_residual, grey, (second, first))) / 2
         if tried:
             # Cells beside a fit that stayed, which holds them back, have no say.
             better = np.where(fit.at_corners(smoother).all(axis=1), told[-1] - predicted, 0.0)
@@ -175,11 +173,11 @@ def cross_validate(
             bend = _averaged_around(fit.bending(*values), fit)
         # Only the first and the last are asked for again: large meshes need the room.
         told = [*told[:1], predicted]
-        tried.append(fitted)
+        tried.append(_Halves(first, second))
         best = [np.where(smoother[:, None], fresh, kept) for fresh, kept in zip(values, best, strict=True)]
     sharpest, own_level = tried[0], fit.at_corners(level)
     own_noise = (grey[0].noise + grey[1].noise) / np.maximum(grey[0].count + grey[1].count, 1.0)
-    distance = told[0] - sharpest.spread(fit) / 4.0
+    distance = told[0] - sharpest.spread(fit) / 2.0
     unresolved = _unresolved_by_kind(fit.broken, bend, distance, own_noise, area * shown)
     sampling, smoothed = np.zeros((2, len(area)))
     for number, fitted in enumerate(tried):

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 from math import ceil
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,8 @@ from .transport import in_three_channels
 _HIDDEN = 0.25
 #: Up to which error fits are as near to the best as they can be; and how many times as far from it at most, beyond.
 _TIGHT, _MOST_LOOSE = 0.01, 10.0
+#: Up to how many cells one thread alone fits them sooner than several, which would wait for the interpreter in turn.
+_ALONE = 8_000
 #: How often the error is estimated anew, and how many times as many passes each time at most: more cannot be foreseen.
 _MOST_ROUNDS, _MOST_GROWTH = 3, 4
 
@@ -230,10 +233,17 @@ def judge_samples(survey: Survey, scene: Scene, workers: Workers) -> Judged:
     area = receivers.cells.area * survey.share_in_sight
     loose = min(max(survey.error / _TIGHT, 1.0), _MOST_LOOSE)
 
-    def judged(halves: list[Samples]) -> Fitted:
-        return cross_validate(fit, halves, area, colours.shown_in_white, loose, workers.each)
+    each = _each(survey, workers)
 
-    return Judged(fit, list(workers.each(judged, survey.sampled)), colours, area, loose)
+    def judged(halves: list[Samples]) -> Fitted:
+        return cross_validate(fit, halves, area, colours.shown_in_white, loose, each)
+
+    return Judged(fit, list(each(judged, survey.sampled)), colours, area, loose)
+
+
+def _each(survey: Survey, workers: Workers) -> Callable[..., Iterable[Any]]:
+    """A `map` for fits on the survey's cells."""
+    return workers.each if len(survey.receivers.cells) > _ALONE else map
 
 
 def more_samples(survey: Survey, time: float) -> float:
@@ -255,12 +265,13 @@ def hide_noise(survey: Survey, judged: Judged, more: float) -> None:
 
 def fit_samples(survey: Survey, judged: Judged, workers: Workers) -> FittedSurvey:
     """Fit all samples so far, as smoothly as each kind of light was judged to want it."""
+    each = _each(survey, workers)
 
     def fitted(halves: list[Samples], part: Fitted) -> Fitted:
-        return fit_halves(judged.fit, halves, part, judged.loose, workers.each)
+        return fit_halves(judged.fit, halves, part, judged.loose, each)
 
     receivers, area = survey.receivers, survey.receivers.cells.area
-    fits = list(workers.each(fitted, survey.sampled, judged.parts))
+    fits = list(each(fitted, survey.sampled, judged.parts))
     alphas, colours = tuple(f.alpha for f in fits), judged.colours
     light = _light(survey, [f.values for f in fits], alphas, UNKNOWN, np.zeros(len(area)), judged.fit)
     arriving = receivers.at_cells(light.arriving)

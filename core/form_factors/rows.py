@@ -78,8 +78,10 @@ class Rows:
             weights = self.weights[pointers[0] : pointers[-1]].astype(np.float64)
             filled = np.flatnonzero(np.diff(pointers))
             first = pointers[filled] - pointers[0]
+            terms = np.empty(len(columns))
             for channel, out in zip(channels, result, strict=True):
-                terms = channel[columns]
+                # Clipping never happens; it only spares numpy a copy of what it takes.
+                np.take(channel, columns, out=terms, mode="clip")
                 terms *= weights
                 out[part.start + filled] = _segment_sums(terms, first)
 
