@@ -162,6 +162,7 @@ def _gather_direct(
         np.concatenate([p.irradiance for p in parts]),
         np.concatenate([p.variance for p in parts]),
         np.concatenate([p.signature for p in parts]),
+        np.concatenate([p.reached for p in parts]),
         sum((p.rays for p in parts), Counter()),
     )
 

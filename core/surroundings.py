@@ -25,9 +25,6 @@ from .visibility import Visibility
 _DARK, _DIM, GAP = 0.05, 0.5, 0.25
 #: Where what is seen is this lit in the mean, or more, nobody is inside a solid, whichever way its surface faces.
 _LIT = 0.25
-#: Standard deviations by which light must differ from none. Two are what the few points of a side in the dark may give,
-#: where the plane of a side cuts a lamp.
-_SIGNIFICANT = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,9 +35,9 @@ class Surroundings:
     one or three channels; if the scene calls for it the sky (as many as Sky.light) and, in as many channels as the
     first, emitting surfaces that are not sampled as lamps; and last the mean of the reflected light again, from coarser
     patches. to_grey (columns - 1,): weights that turn the columns into the mean irradiance of the three channels.
-    lit (codes, 1): how lit is what a ray meets, however dark its colour: 1 where the sources reach it, elsewhere its
-    irradiance as a share of the mean, 1 at most; in both halves, for one may not have looked there. level_doubts: by
-    what share of itself each half may misjudge all reflected light, by its rays and by larger patches.
+    lit (codes, 1): how lit is what a ray meets, however dark its colour: the share of it that the sources reach, or its
+    irradiance as a share of the mean, up to 1, if that is more; in both halves, for one may not have looked there.
+    level_doubts: by what share of itself each half may misjudge all reflected light, by its rays and by larger patches.
     """
 
     hemispheres: Hemispheres
@@ -115,10 +112,9 @@ def _completed(tables: list[Float32], halves: tuple[Transport, ...]) -> tuple[Fl
 def _lit(half: Transport, sky: Sky) -> Float32:
     arriving = half.solution.irradiance.mean(axis=1)
     mean = half.sides.area @ arriving / half.sides.area.sum()
-    # What the sources reach is lit however bright others are: a room may lie beside a street in the sun.
-    reached = half.incoming.mean(axis=1) > _SIGNIFICANT * half.noise
     share = np.clip(arriving, 0.0, mean) / mean if mean > 0.0 else np.zeros_like(arriving)
-    met = half.by_code(np.where(reached, 1.0, share)[:, None])
+    # What the sources reach is lit however bright others are: a room may lie beside a street in the sun.
+    met = half.by_code(np.maximum(share, half.reached)[:, None])
     return np.concatenate([met, np.zeros((len(sky.light), 1), dtype=np.float32)])
 
 

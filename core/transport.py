@@ -48,14 +48,13 @@ class Exchange:
 class Transport:
     """Solved light on patch sides.
 
-    incoming (s, 3): irradiance W/m^2 straight from the sources; noise (s,): the standard deviation of its mean over the
-    channels, by shadow rays. rays cast, by purpose. mirrored_emission: whether rays
-    saw emitting surfaces in mirrors.
+    incoming (s, 3): irradiance W/m^2 straight from the sources; reached (s,): the share of each side that rays say is
+    lit by any. rays cast, by purpose. mirrored_emission: whether rays saw emitting surfaces in mirrors.
     """
 
     exchange: Exchange
     incoming: Float64
-    noise: Float64
+    reached: Float64
     solution: Solution
     rays: Counter[str]
     mirrored_emission: bool = False
@@ -191,19 +190,26 @@ def fill_with_light(
     """Direct light on every side, and all that the sides then send to each other. sky: the one of the exchange, or
     None for its light to be left out."""
     sides = exchange.sides
-    incoming, noise, shadow_rays = light_on_sides(
+    straight, reached, shadow_rays = light_on_sides(
         sides, direct_light, workers, effort.shadow_rays_of_site, seed, purpose
     )
+    incoming = straight.copy()
     if sky is not None:
         incoming += exchange.opening.light @ sky.irradiance
     if effort.emitters_by_rays:
         incoming += _received(exchange, np.pi * sides.emission, workers)
     elif exchange.glints is not None:
         incoming += exchange.glints
+    reached = np.where((incoming > straight).any(axis=1), 1.0, reached)
     solution = _solve(exchange, incoming[:, : effort.channels], effort.tolerance, workers)
     solution = replace(solution, irradiance=in_three_channels(solution.irradiance))
     return Transport(
-        exchange, incoming, noise, solution, exchange.rays + shadow_rays, mirrored_emission=exchange.glints is not None
+        exchange,
+        incoming,
+        reached,
+        solution,
+        exchange.rays + shadow_rays,
+        mirrored_emission=exchange.glints is not None,
     )
 
 
@@ -291,16 +297,15 @@ def _without_gain(exchange: Rows, sides: Sides, channel: int) -> Rows:
 def light_on_sides(
     sides: Sides, direct_light: DirectLight, workers: Workers, shadow_rays: int, seed: int, purpose: str
 ) -> tuple[Float64, Float64, Counter[str]]:
-    """Mean irradiance (s, 3) of each side straight from lamps and emitting surfaces, the standard deviation (s,) of its
-    mean over the channels, and the rays it took."""
+    """Mean irradiance (s, 3) of each side straight from lamps and emitting surfaces, the share (s,) of it that these
+    reach, and the rays it took."""
 
     def work(number: int, part: slice) -> tuple[Float64, Float64, Counter[str]]:
         rng = stream(seed, "light on sides " + purpose, number)
         normals = sides.normals[part].reshape(-1, 3)
         light = direct_light.at(sides.points[part].reshape(-1, 3), normals, normals, shadow_rays, rng)
-        deviation = np.sqrt(light.variance).mean(axis=1).reshape(-1, SITES)
-        noise = np.sqrt((deviation**2).sum(axis=1)) / SITES
-        return light.irradiance.reshape(-1, SITES, 3).mean(axis=1), noise, light.rays
+        reached = light.reached.reshape(-1, SITES).mean(axis=1)
+        return light.irradiance.reshape(-1, SITES, 3).mean(axis=1), reached, light.rays
 
-    irradiance, noise, rays = zip(*workers.map(work, len(sides.side), _CHUNK), strict=True)
-    return np.concatenate(irradiance), np.concatenate(noise), sum(rays, Counter())
+    irradiance, reached, rays = zip(*workers.map(work, len(sides.side), _CHUNK), strict=True)
+    return np.concatenate(irradiance), np.concatenate(reached), sum(rays, Counter())

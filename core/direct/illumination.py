@@ -35,11 +35,13 @@ MOST_CONTOURED = 16
 @dataclass(frozen=True, eq=False)
 class Illumination:
     """irradiance (n, 3) W/m^2 and its variance (n, 3), or more channels where some lights are told apart; signature
-    (n,) int64: equal numbers see the same lights whole, and -1 sees some light in part; rays cast, by purpose."""
+    (n,) int64: equal numbers see the same lights whole, and -1 sees some light in part; reached (n,): some way to a
+    light was free, which is surer than an irradiance that may be there by chance; rays cast, by purpose."""
 
     irradiance: Float64
     variance: Float64
     signature: np.ndarray
+    reached: Bool
     rays: Counter[str]
 
     @property
@@ -49,7 +51,13 @@ class Illumination:
 
     def only(self, chosen: NDArray[np.int64]) -> Illumination:
         """At some of the points; of rays all are counted."""
-        return Illumination(self.irradiance[chosen], self.variance[chosen], self.signature[chosen], self.rays)
+        return Illumination(
+            self.irradiance[chosen],
+            self.variance[chosen],
+            self.signature[chosen],
+            self.reached[chosen],
+            self.rays,
+        )
 
     def beside(self, other: Illumination) -> Illumination:
         """Both, told apart by their channels."""
@@ -58,6 +66,7 @@ class Illumination:
             np.concatenate([self.irradiance, other.irradiance], axis=1),
             np.concatenate([self.variance, other.variance], axis=1),
             np.where(partly, -1, self.signature + other.signature),
+            self.reached | other.reached,
             self.rays + other.rays,
         )
 
@@ -107,11 +116,12 @@ class _Look:
 @dataclass(frozen=True, eq=False)
 class _Answer:
     """How much of a light receivers (n,) see: seen (h, n, 1), or (h, n, 3) in each channel, by each half of the ways;
-    which see it whole, and which in part; rays cast, by purpose."""
+    which see it whole, and which in part, and which it has reached; rays cast, by purpose."""
 
     seen: Float64
     whole: Bool
     partly: Bool
+    reached: Bool
     rays: Counter[str]
 
 
@@ -195,7 +205,8 @@ class DirectLight:
         # (halves, n, 1), or one for each channel.
         seen = np.stack([_seen(*channel) for channel in zip(expected, weights, arrived, strict=True)], axis=2)
         whole = look.clear.all(axis=0)
-        return _Answer(seen, whole, look.free.any(axis=0) & ~whole, look.rays)
+        reached = (look.arrived > 0).any(axis=(0, 1))
+        return _Answer(seen, whole, look.free.any(axis=0) & ~whole, reached, look.rays)
 
     def _ask_some(
         self, crowd: Crowd, tally: _Tally, points: Float64, shading: Float64, rays: int, rng: np.random.Generator
@@ -217,6 +228,7 @@ class DirectLight:
             hidden = ~answer.whole & ~answer.partly
             np.add.at(tally.signature, some.point[hidden], self._names[some.light[hidden]])
             tally.partly[some.point[answer.partly]] = True
+            tally.reached[some.point[answer.reached]] = True
             tally.rays += answer.rays
         arrived, expected = np.zeros((2, 2 * count, 3))
         free, clear, asked = np.zeros((3, count))
@@ -225,6 +237,7 @@ class DirectLight:
             # A way without size brings exactly the share, however its length was rounded.
             whole = look.weights.mean(axis=0) if light.sized else some.share
             part = look.arrived.mean(axis=1) if light.sized else whole * look.passed[:, 0]
+            tally.reached[some.point[(part > 0).any(axis=0)]] = True
             place = some.half * count + some.point
             expected += _summed(whole[:, None] * some.color, place, 2 * count)
             arrived += _summed(part.T * some.color, place, 2 * count)
@@ -250,7 +263,9 @@ class DirectLight:
         passed = np.zeros((3, *bright.shape), dtype=np.float32)
         free, tint, cast = self._trace(tally.receivers, shots.towards, sample, point)
         passed[:, sample, point] = free if tint is None else tint
-        seen = _means(shots.brings * passed, 2).transpose(1, 2, 0).astype(np.float64)
+        arrived = shots.brings * passed
+        tally.reached |= (arrived > 0).any(axis=(0, 1))
+        seen = _means(arrived, 2).transpose(1, 2, 0).astype(np.float64)
         tally.irradiance += seen.mean(axis=0)
         tally.variance += (seen[0] - seen[1]) ** 2 / 4.0
         tally.partly |= (passed > 0).any(axis=(0, 1)) & (bright & (passed < 1)).any(axis=(0, 1))
@@ -301,7 +316,7 @@ class _Tally:
         self.receivers = receivers
         self.irradiance, self.variance = np.zeros((2, count, 3))
         self.signature = np.zeros(count, dtype=np.int64)
-        self.partly = np.zeros(count, dtype=bool)
+        self.partly, self.reached = np.zeros((2, count), dtype=bool)
         self.rays: Counter[str] = Counter()
 
     def add(self, lit: NDArray[np.int64], answer: _Answer, color: Float64, name: int) -> None:
@@ -311,11 +326,12 @@ class _Tally:
             self.variance[lit] += ((answer.seen[0] - answer.seen[1]) * color) ** 2 / 4.0
         self.signature[lit] += np.where(answer.whole, name, 0)
         self.partly[lit] |= answer.partly
+        self.reached[lit] |= answer.reached
         self.rays += answer.rays
 
     def illumination(self) -> Illumination:
         signature = np.where(self.partly, -1, self.signature)
-        return Illumination(self.irradiance, self.variance, signature, self.rays)
+        return Illumination(self.irradiance, self.variance, signature, self.reached, self.rays)
 
 
 def _without_occluders(light: Light, receivers: _Receivers, unit: Float32) -> tuple[Float32, Float32, Float32]:

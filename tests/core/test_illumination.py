@@ -82,6 +82,18 @@ def test_what_is_hidden_is_exactly_dark(build, lamp):
     assert seen.variance.max() == 0
 
 
+@pytest.mark.parametrize("together", [1, 30])
+def test_no_lamp_reaches_the_dark_by_chance(build, together):
+    """Of a lamp that the plane of a surface cuts, some ways bring nothing and take no ray: what the two that are left
+    do not tell is a guess, right on average only, and it is there in the dark as well."""
+    low = [AreaLamp("low", (0, 0.5, 0.02), (0.2, 0, 0), (0, 0, 0.2), (0, -1, 0), (1.0, 2.0, 4.0))] * together
+    wall = build.quad("wall", (-0.9, 0.25, -0.9), (1.8, 0, 0), (0, 0, 1.8))
+    hidden, free = (behind(build, low, *objects, rays=2, tries=200) for objects in ([wall], []))
+    assert (hidden.irradiance != 0).any() == (together == 1), "many lamps tell more of each other"
+    assert not hidden.reached.any()
+    assert free.reached.mean() > 0.5
+
+
 @pytest.mark.parametrize("rays", [2, 4, 64])
 def test_what_is_seen_of_a_large_near_lamp_is_the_light_of_that_part(build, rays):
     """A sail right under the lamp hides what is beyond x = 0.3; the rest is an area lamp of its own."""

@@ -336,6 +336,13 @@ def test_small_scenes_have_rays_while_they_cost_next_to_nothing(error, rays):
     assert gather_rays(error) == rays
 
 
+@pytest.mark.parametrize(("cells", "rays"), [(300, 128), (3_000, 64), (12_000, 32), (200_000, 32)])
+def test_points_on_few_cells_look_around_with_more_rays(build, cells, rays):
+    effort = build.effort(gather_rays=32)
+    assert effort.rays_of_point(cells) == rays
+    assert replace(effort, gather_rays=256).rays_of_point(300) == 256
+
+
 @pytest.mark.parametrize(("error", "rays"), [(0.05, 4), (0.02, 8), (0.01, 32), (0.005, 64)])
 def test_noise_falls_with_the_root_of_the_rays(error, rays):
     """In large scenes half the error takes four times as many; more than the most are passes."""

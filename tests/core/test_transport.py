@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -229,6 +232,28 @@ def test_halves_are_independent_answers_to_one_question(build, workers):
     assert one.energy()["absorbed"] == pytest.approx(two.energy()["absorbed"], rel=0.03)
     black = Scene(scene.objects, (Surface("black", (0, 0, 0)),) * 3, scene.lamps)
     assert solve_halves(patches, visibility, light, DARK, plan(black, Settings()), workers, 0) == ()
+
+
+def test_what_one_half_alone_has_met_is_no_hole_in_the_other(build, workers):
+    """Of the insides of two boxes that run through each other few rays find other parts than as many others do, and a
+    receiver's rays may meet any of them."""
+    one = build.box("one", (-0.5, 0.0, 0.0), (0.2, 0.5, 0.5))
+    two = build.box("two", (-0.1, 0.2, -0.3), (0.5, 0.4, 0.3))
+    room = build.box("room", (-1, -1, -1), (1, 1, 1), inward=True)
+    lamp = PointLamp("bulb", (0.0, -0.5, 0.0), (1.0, 1.0, 1.0))
+    shown = Scene((one, two, room), (build.grey,), (lamp,))
+    patches = build.patches(shown, 1000)
+    visibility = Visibility(patches.corners)
+    light = DirectLight([place(lamp, unit_space(shown)) for lamp in shown.lamps], visibility, 0)
+    planned = plan(shown, Settings())
+    planned = replace(planned, effort=replace(planned.effort, transport_rays=4))
+    halves = solve_halves(patches, visibility, light, DARK, planned, workers, 0)
+    around = surroundings.look_up(patches, visibility, halves, DARK, planned.effort, 0)
+    alone = [np.setdiff1d(*sides) for sides in permutations([half.sides.side for half in halves])]
+    assert all(len(some) for some in alone)
+    for some in alone:
+        assert np.array_equal(around.tables[0][some, :3], around.tables[1][some, :3])
+        assert not around.lit[some].any(), "for nobody knows"
 
 
 @pytest.mark.parametrize("estimator", ["hemisphere", "analytic", "centroid"])
