@@ -32,12 +32,12 @@ _PATIENCE = 1.0
 #: Beyond Embree's own time, in numbers summed by one thread. That all threads share: of a ray that gathers, of one that
 #: looks for a lamp, of the choice whether to ask one, of a transport ray that meets something and so makes a form
 #: factor, of a cell in each fit.
-_LOOK, _AIM, _CHOOSE, _FORM_FACTOR, _FIT = 24.0, 80.0, 25.0, 60.0, 1200.0
+_LOOK, _AIM, _CHOOSE, _FORM_FACTOR, _FIT = 21.0, 70.0, 22.0, 52.0, 1000.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
 #: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 30.0, 800.0, 1800.0, 6600.0, 3400.0, 1700.0
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 25.0, 680.0, 1500.0, 5500.0, 2600.0, 1400.0
 #: Of any bake, however small, and of any round of finding where light bends.
-_FIXED, _ROUND = 3.0e7, 2.4e7
+_FIXED, _ROUND = 2.6e7, 1.4e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
 _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 1700.0, 15_000.0, 600.0
 

@@ -58,8 +58,8 @@ def patches_by_light(
         before, (split, changed) = split, _refined(split, patches, uneven)
         patches = make_patches(scene, space, split, patches if split.same_triangles(before) else None)
         fresh = np.unique(patches.patch[changed[patches.triangle]])
-    # Patches of dense meshes get finer by fewer triangles each: the same triangles meet the rays.
     patches = replace(patches, parted=parted(patches, visibility))
+    # Patches of dense meshes get finer by fewer triangles each: the same triangles meet the rays.
     return patches, visibility if len(patches.area) == triangles else Visibility(patches.corners, patches.optics)
 
 

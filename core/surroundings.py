@@ -55,7 +55,8 @@ class Surroundings:
 
     def from_cells(self, cells: int, effort: Effort, seed: int) -> Surroundings:
         """The same, looked at from so many cells with as many rays of each point as that takes."""
-        return self.with_rays(effort.rays_of_point(cells), stream(seed, "gather patterns"))
+        rays = effort.rays_of_point(cells)
+        return self if rays == self.hemispheres.rays else self.with_rays(rays, stream(seed, "gather patterns"))
 
     def look(self, points: Points, seed: int, number: int, workers: Workers) -> tuple[Float64, Bool, Counter[str]]:
         """Irradiance (n,) at the points that does not come straight from the sources, the mean of the channels; whether
