@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from copy import copy
-from dataclasses import replace
 
 import numpy as np
 
@@ -147,7 +146,9 @@ def gather_direct(
     variance[lit] = share**2 * light.variance[lit] + (1.0 - share) ** 2 * other.variance
     partly = (signature[lit] < 0) | (other.signature < 0)
     signature[lit] = np.where(partly, -1, signature[lit] + 3 * other.signature)
-    return replace(light, irradiance=irradiance, variance=variance, signature=signature, rays=light.rays + other.rays)
+    reached = light.reached.copy()
+    reached[lit] |= other.reached
+    return Illumination(irradiance, variance, signature, reached, light.rays + other.rays)
 
 
 def _gather_direct(

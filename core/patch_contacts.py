@@ -27,8 +27,8 @@ _ENDS, _ASIDE = 1e-3, 5e-5
 _HALVINGS, _WITHIN, _SNAP = 16, 4e-4, 2e-3
 #: Of the way from the middle of a triangle to a corner, what tells whether something stands on it still.
 _TOWARDS = 0.95
-#: How often pieces are looked at again, and up to how many times as many triangles; and how high, relative to a patch's
-#: edge, a triangle is that is looked at: of slivers rays tell only by chance what stands on them.
+#: How often pieces are looked at again, and up to how many times as many patches; and how high, relative to a patch's
+#: edge, a piece is that is looked into: of slivers rays tell only by chance what stands on them.
 _LEVELS, _GROWTH, _HIGH = 6, 1.5, 0.05
 #: Sine of the angle up to which a way runs along a patch; cosine of the angle from which on a surface does not stand on
 #: another but folds onto it: there rays start beyond it, and meet it from behind.
@@ -66,27 +66,27 @@ class _Ways:
 
 
 def cut_at_contacts(split: PatchMeshes, patches: Patches, visibility: Visibility) -> PatchMeshes:
-    """The triangles that are patches, cut along what stands on either side of them; the meshes as they are where
-    nothing does. Edges are cut where they are crossed; where a corner of what stands there lies inside a triangle, that
+    """The triangles that are patches, cut along what stands on either side of them; what was given where nothing does.
+    Edges are cut where they are crossed; where a corner of what stands there lies inside a triangle, that
     is split into four first.
 
     split: what the patches were made of; visibility: among them.
     """
-    limit = _GROWTH * len(split.halvings)
+    given, room = split, int((_GROWTH - 1.0) * len(patches))
+    most = len(split.halvings) + room
     chosen = np.zeros(len(split.halvings), dtype=bool)
     chosen[patches.triangle] = np.bincount(patches.patch)[patches.patch] == 1
     for _ in range(_LEVELS):
-        split, cut = _split_each(split, _contacts(split, patches, visibility, chosen), cut_edges)
-        pieces = chosen[cut] & (np.bincount(cut)[cut] > 1)
-        chosen = chosen[cut]
+        places = _contacts(split, patches, visibility, chosen, most - len(chosen))
+        split, cut = _split_each(split, places, cut_edges)
+        pieces, chosen = chosen[cut] & (np.bincount(cut)[cut] > 1), chosen[cut]
         chosen[_thin(split, chosen)] = False
-        crossed = _crossed(split, patches.space, visibility, chosen)
-        crossed[np.flatnonzero(crossed)[max(int(limit - len(crossed)) // 3, 0) :]] = False
+        crossed = _crossed(split, patches.space, visibility, chosen, most - len(chosen))
         split, quartered = _split_each(split, crossed, split_triangles)
         chosen = (pieces | (np.bincount(quartered) > 1) & chosen)[quartered]
-        if not chosen.any() or len(chosen) > limit:
+        if not chosen.any() or len(chosen) >= most:
             break
-    return split
+    return given if given.same_triangles(split) else split
 
 
 def _split_each(
@@ -118,12 +118,15 @@ def parted(patches: Patches, visibility: Visibility) -> Bool:
     return apart
 
 
-def _contacts(split: PatchMeshes, patches: Patches, visibility: Visibility, chosen: Bool) -> Float64:
+def _contacts(split: PatchMeshes, patches: Patches, visibility: Visibility, chosen: Bool, room: int) -> Float64:
     """Places (t, 3) on the edges of the chosen triangles (t,) where they are to be cut, see `tessellation.cut_edges`;
-    nan elsewhere."""
+    nan elsewhere. room: for so many more triangles; the longest edges come first."""
     vertices, triangles = _together(split)
     vertices = patches.space.normalise(vertices)
-    number, _, side = numbered_edges(triangles)
+    number, ends, side = numbered_edges(triangles)
+    # Of both sides of an edge the first that belongs to a chosen triangle.
+    theirs = np.flatnonzero(np.repeat(chosen, 3))[::-1]
+    side[number.ravel()[theirs]] = theirs
     some = np.flatnonzero(chosen[side // 3])
     ways = _along_edges(vertices, triangles[side[some] // 3], side[some] % 3)
     place = np.full(len(side), np.nan)
@@ -131,11 +134,16 @@ def _contacts(split: PatchMeshes, patches: Patches, visibility: Visibility, chos
         free = np.flatnonzero(np.isnan(place[some]))
         place[some[free]] = _first_contact(on_side.only(free), patches, visibility)
     place[(place < _SNAP) | (place > 1.0 - _SNAP)] = np.nan
+    cut = np.flatnonzero(np.isfinite(place))
+    length = np.linalg.norm(vertices[ends[cut, 1]] - vertices[ends[cut, 0]], axis=1)
+    # Each makes two triangles more, one on either side.
+    place[cut[np.argsort(-length, kind="stable")[max(room // 2, 0) :]]] = np.nan
     return place[number]
 
 
-def _crossed(split: PatchMeshes, space: Space, visibility: Visibility, chosen: Bool) -> Bool:
-    """Which of the chosen triangles (t,) something stands on still, between the middle and a corner."""
+def _crossed(split: PatchMeshes, space: Space, visibility: Visibility, chosen: Bool, room: int) -> Bool:
+    """Which of the chosen triangles (t,) something stands on still, between the middle and a corner. room: for so many
+    more triangles; the largest come first."""
     vertices, triangles = _together(split)
     some = np.flatnonzero(chosen)
     corners = space.normalise(vertices[triangles[some]])
@@ -143,8 +151,11 @@ def _crossed(split: PatchMeshes, space: Space, visibility: Visibility, chosen: B
     ways = _Ways(middles, corners.reshape(-1, 3), np.repeat(triangle_geometry(corners)[0], 3, axis=0))
     places = np.full(len(ways.first), _TOWARDS)
     barred = ways.barred(places, visibility) | ways.turned().barred(places, visibility)
+    standing = np.flatnonzero(barred.reshape(-1, 3).any(axis=1))
+    by_size = np.argsort(-triangle_geometry(corners)[1][standing], kind="stable")
     crossed = np.zeros(len(chosen), dtype=bool)
-    crossed[some] = barred.reshape(-1, 3).any(axis=1)
+    # Each makes three triangles more, and those beside it as many.
+    crossed[some[standing[by_size[: max(room // 6, 0)]]]] = True
     return crossed
 
 

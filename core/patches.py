@@ -115,8 +115,8 @@ class Patches:
     @cached_property
     def coarser_groups(self) -> Int32:
         """The group (p,) of each patch when about four neighbours of its size that face the same way, of one surface,
-        become one: those whose centres lie in one cube of a grid, each side of it as large as four of them, with
-        nothing that parts them."""
+        become one: those whose centres lie in one cube of a grid, each side of it as large as four of them; and apart
+        from these, those of them that something parts from the largest."""
         center, facing = self.centres
         median = np.median(self.patch_area)
         level = np.rint(np.log2(self.patch_area / median) / 2.0)[:, None]

@@ -87,7 +87,7 @@ def look_up(
     by_rays = channels * effort.emitters_by_rays
     return Surroundings(
         hemispheres=Hemispheres(patches, visibility, effort.gather_rays, stream(seed, "gather patterns"), sky),
-        tables=_completed([_table(half, sky, effort) for half in halves], halves),
+        tables=_completed([_table(half, sky, effort) for half in halves], halves, len(sky.light)),
         reflected=slice(0, channels),
         sky=slice(channels, channels + seen),
         emitted=slice(channels + seen, channels + seen + by_rays),
@@ -99,14 +99,16 @@ def look_up(
     )
 
 
-def _completed(tables: list[Float32], halves: tuple[Transport, ...]) -> tuple[Float32, ...]:
+def _completed(tables: list[Float32], halves: tuple[Transport, ...], texels: int) -> tuple[Float32, ...]:
     """The tables of both halves. A side that only rays of one have met brings in the other what it does there, for a
-    receiver's rays may meet it too."""
+    receiver's rays may meet it too, also off mirrors where both tables say what it brings then. texels: of the sky."""
+    codes = 2 * len(halves[0].sides.patches) + 1 + texels
     met = [np.isin(np.arange(2 * len(half.sides.patches)), half.sides.side) for half in halves]
     completed = [table.copy() for table in tables]
     for own, other in ((0, 1), (1, 0)):
         only = np.flatnonzero(met[other] & ~met[own])
-        completed[own][only] = tables[other][only]
+        for first in range(0, min(map(len, tables)), codes):
+            completed[own][first + only] = tables[other][first + only]
     return tuple(completed)
 
 
