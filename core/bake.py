@@ -201,7 +201,7 @@ def finer_where_it_matters(
     limit = len(receivers.cells) + int(effort.growth * effort.triangles)
     finest = adaptation.refine_receivers(survey, limit, effort.error)
     if finest.tessellated:
-        finest = contours.cut(finest)[0]
+        finest = contours.cut(finest).receivers
     if finest is not receivers:
         survey = gone_on(survey, finest)  # which frees the first, before it needs room for more
         survey.run_pass()

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contours import Contours
+from .contours import Contours, Cut
 from .direct.illumination import DirectLight
 from .gather import Points
 from .parallel import Workers
@@ -20,8 +20,8 @@ from .plan import BEND_PASSES, BEND_RAYS, BEND_ROUNDS, Effort
 from .receivers import Receivers, split_cells
 from .refinement import FittedSurvey, fit_samples, judge_samples
 from .sampling import stream, subseed
-from .scene import Bool, Scene
-from .splitting import until_allowed
+from .scene import Bool, Float64, Scene
+from .splitting import MORE, until_allowed
 from .surroundings import GAP, Surroundings
 from .survey import Survey
 from .tessellation import Int64
@@ -35,7 +35,7 @@ _KEPT = 0.25
 #: less error, and a contour in tatters is worse to see than coarse cells. A cut for all is worse again, and so is six.
 _CUT = 0.25
 #: What share of the squared error triangles that are split once more must take away: it takes samples and another fit.
-_WORTH = 0.1
+_WORTH = 0.15
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
 
@@ -67,8 +67,8 @@ class Bends:
     ) -> None:
         self.rays: Counter[str] = Counter()
         self._limit = limit
-        #: Before contours cut them, and from which of these cells those come that are left of the cuts.
-        self._uncut, self._source = receivers, np.arange(len(receivers.cells))
+        #: Before contours cut them, and as they were cut last.
+        self._uncut, self._last = receivers, Cut.none(receivers)
         self._light = direct_light
         self._around = around and around.with_rays(BEND_RAYS, stream(seed, "bend patterns"))
         self._effort = effort
@@ -85,8 +85,8 @@ class Bends:
             found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
             # The errors of small cells are known better: some room is left for those of later rounds.
             worst = self._worst(survey, found, 1.0 if number == BEND_ROUNDS - 1 else 0.5)
-            least = _CUT * worst.spared
-            if not worst.chosen.any():
+            before, least = least, _CUT * worst.spared
+            if not worst.chosen.any() and least <= before:
                 return trial
             self._uncut = split_cells(self._uncut, worst.chosen)[0]
             if worst.enough:
@@ -103,9 +103,16 @@ class Bends:
         return self._cut(_CUT * worst.spared)
 
     def _cut(self, least: float) -> Receivers:
-        """The triangles there are by now, cut along contours; least: as there."""
-        receivers, self._source = self._contours.cut(self._uncut, least)
-        return receivers
+        """The triangles there are by now, cut along contours; least: as there, or more where there is no room."""
+        self._last = self._contours.cut(self._uncut, least)
+        if len(self._last.source) > self._limit:
+            worth, pieces = self._last.worth, np.bincount(self._last.source, minlength=len(self._last.worth)) - 1
+            by_worth = np.argsort(-worth, kind="stable")
+            fitting = np.count_nonzero(np.cumsum(pieces[by_worth]) <= self._limit - len(worth))
+            if fitting < len(worth):
+                least = float(np.nextafter(worth[by_worth[fitting]], np.inf))
+                self._last = self._contours.cut(self._uncut, least)
+        return self._last.receivers
 
     def _surveyed(self, receivers: Receivers, number: int, earlier: Survey | None) -> Survey:
         """Samples of the receivers' cells, of those that an earlier survey had as well the same."""
@@ -126,23 +133,38 @@ class Bends:
         a share may be taken."""
         area = self._uncut.cells.area
         large = area > _SMALLEST * area.sum() / self._limit
-        room = int(share * (self._limit - len(self._source)))
         pieces = found.unresolved
         # Of what is over a gap nothing is known: it may be off by all of the mean light.
         gaps = self._over_gaps(survey)
         pieces[gaps] = np.maximum(pieces[gaps], survey.receivers.cells.area[gaps] * found.radiance**2)
-        squared = np.bincount(self._source, pieces, len(large)).astype(np.float64)
+        squared = np.bincount(self._last.source, pieces, len(large)).astype(np.float64)
         allowed = (_SHARE * self._effort.error * found.radiance) ** 2 * float(area.sum())
         chosen = np.zeros(len(large), dtype=bool)
         total = float(np.maximum(squared, 0.0).sum())
         # What is split adds to what is left; where it alone is more than is allowed, there will be another round.
         uncut = max((allowed - _KEPT * total) / (1.0 - _KEPT), allowed / 2.0)
-        chosen[until_allowed(squared, uncut, room)] = True
+        chosen[until_allowed(squared, uncut, self._room(squared, share))] = True
         left = np.maximum(squared[~chosen], 0.0)
         spared = float(left.max(initial=0.0)) if left.sum() > uncut else 0.0
         chosen &= large
         lost = (1.0 - _KEPT) * float(squared[chosen].sum())
         return _Worst(chosen, lost / total if total > 0.0 else 0.0, total - lost <= allowed, spared)
+
+    def _room(self, squared: Float64, share: float) -> int:
+        """For how many cells more there is room where those of the largest squared error (c,) are split, beside the
+        cuts along contours that are then worth making. Splits may take a share of what cuts leave."""
+        worst = -np.sort(-squared[squared > 0.0])
+        # While ever smaller errors are split: a cell is cut, or it is split and some of its quarters are cut, where the
+        # contour crosses more sides.
+        worth, crossed = self._last.worth / _CUT, self._last.crossed
+        pieces = np.maximum(np.bincount(self._last.source, minlength=len(worth)) - 1, crossed)
+        begin = np.concatenate([np.maximum(worth, squared), squared, np.minimum(worth / 4.0, squared)])
+        more = np.concatenate([pieces, -pieces, pieces + crossed])
+        order = np.argsort(-begin, kind="stable")
+        cuts = np.append(0, np.cumsum(more[order]))[np.searchsorted(-begin[order], -worst, side="right")]
+        splits = MORE * np.arange(1, len(worst) + 1)
+        fits = splits / share + cuts <= self._limit - len(self._uncut.cells)
+        return MORE * int(np.count_nonzero(fits))
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for

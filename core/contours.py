@@ -14,10 +14,13 @@ edge shows the light about as well: a shadow that is soft over all of it.
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .convexity import nothing_stands_between
 from .direct.illumination import MOST_CONTOURED, DirectLight
@@ -124,42 +127,55 @@ class _Crossings:
     """
 
     place: Float64
-    inward: Int64
+    inward: Float64
     step: Float64
 
     @classmethod
     def none(cls, count: int) -> _Crossings:
-        return cls(np.full(count, np.nan), np.zeros(count, dtype=np.int64), np.zeros(count))
+        return cls(np.full(count, np.nan), np.zeros(count), np.zeros(count))
 
     def __setitem__(self, chosen: Int64 | Bool, found: _Crossings) -> None:
-        for field in fields(self):
-            getattr(self, field.name)[chosen] = getattr(found, field.name)
+        for own, new in zip(self.columns(), found.columns(), strict=True):
+            own[chosen] = new
 
-    def __getitem__(self, chosen: Int64 | Bool) -> _Crossings:
-        return _Crossings(*(getattr(self, field.name)[chosen] for field in fields(self)))
+    def columns(self) -> tuple[Float64, ...]:
+        return self.place, self.inward, self.step
 
-    def beside(self, other: _Crossings) -> _Crossings:
-        """These, and then the others."""
-        return _Crossings(*(np.append(getattr(self, f.name), getattr(other, f.name)) for f in fields(self)))
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """Receivers with cells cut along contours; source: for each new cell the one it came from. Of those there were
+    before: worth (c,), the largest squared step of radiance, times the area, of a contour that crosses the cell, 0
+    without any, and crossed (c,), how many of its sides contours cross, also where these were left alone."""
+
+    receivers: Receivers
+    source: Int64
+    worth: Float64
+    crossed: Int64
+
+    @classmethod
+    def none(cls, receivers: Receivers) -> Cut:
+        count = len(receivers.cells)
+        return cls(receivers, np.arange(count), np.zeros(count), np.zeros(count, dtype=np.int64))
 
 
 class _Known:
-    """What has been found on edges, by their keys: most of them are asked for again after some cells were split."""
+    """What has been found somewhere, by keys: most of it is asked for again after some cells were split."""
 
-    def __init__(self) -> None:
-        self._keys, self._found = np.zeros(0), _Crossings.none(0)
+    def __init__(self, columns: int) -> None:
+        self._keys, self._found = np.zeros(0), np.zeros((columns, 0))
 
-    def recall(self, keys: Float64) -> tuple[Bool, _Crossings]:
-        """Which of the edges (e,) are known, and what was found on those."""
+    def recall(self, keys: Float64) -> tuple[Bool, Float64]:
+        """Which of the keys (n,) are known, and what (columns, m) was found at those."""
         at = np.searchsorted(self._keys, keys)
         known = np.zeros(len(keys), dtype=bool)
         inside = at < len(self._keys)
         known[inside] = self._keys[at[inside]] == keys[inside]
-        return known, self._found[at[known]]
+        return known, self._found[:, at[known]]
 
-    def remember(self, keys: Float64, found: _Crossings) -> None:
-        every, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
-        self._keys, self._found = every, self._found.beside(found)[first]
+    def remember(self, keys: Float64, found: Sequence[NDArray[Any]]) -> None:
+        self._keys, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
+        self._found = np.concatenate([self._found, found], axis=1)[:, first]
 
 
 class Contours:
@@ -177,17 +193,18 @@ class Contours:
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
         self._nothing_to_find = alone or (not self._lights and around is None)
         self._around = around and around.with_rays(_RAYS, stream(seed, "contour patterns"))
-        self._known = _Known()
+        self._known_crossings, self._known_breaks = _Known(3), _Known(1)
         self._seed = seed
         self._workers = workers
 
-    def cut(self, receivers: Receivers, least: float = 0.0) -> tuple[Receivers, Int64]:
-        """The receivers with cells cut along the contours; and for each new cell the one it came from. least: a shadow
-        is left alone where its step, squared, in radiance, times the area of the cell that it crosses is less.
+    def cut(self, receivers: Receivers, least: float = 0.0) -> Cut:
+        """The receivers with cells cut along the contours. least: a shadow is left alone where it is worth less, as
+        worth is counted in what comes of it, to the larger of the cells whose side it crosses.
         """
-        source = np.arange(len(receivers.cells))
+        cut = Cut.none(receivers)
         if self._nothing_to_find:
-            return receivers, source
+            return cut
+        source, worth, crossed = cut.source, cut.worth, cut.crossed
         middles = Points(receivers.cells, source, np.full((len(source), 3), 1 / 3))
         sight = self._sight(middles, GAP * middles.size)
         near = self._borders(receivers, middles, sight)
@@ -195,25 +212,28 @@ class Contours:
         uncut = [len(mesh.vertices) for mesh in receivers.fine]
         contoured = np.zeros(len(source), dtype=bool)
         # In radiance, squared, times the area.
-        shown = cell_colours(self._scene, receivers).shown_in_white * receivers.cells.area if least > 0.0 else None
+        shown = cell_colours(self._scene, receivers).shown_in_white * receivers.cells.area
         for _ in range(_PASSES):
             if not near.any():
                 break
             number, _, side = numbered_edges(receivers.cell_vertex)
             found = self._follow(receivers, number, side, near)
-            if shown is not None:
-                found.place[found.step**2 * _larger_beside(shown[source], number) < least] = np.nan
-            crossed = np.flatnonzero(np.isfinite(found.place))
-            edges, place, inward = _Edges.of(receivers, side[crossed]), found.place[crossed], found.inward[crossed]
+            crossing = np.isfinite(found.place)
+            on_edge = np.where(crossing, found.step**2 * _larger_beside(shown[source], number), 0.0)
+            np.maximum.at(worth, source, on_edge[number].max(axis=1))
+            np.maximum.at(crossed, source, np.count_nonzero(crossing[number], axis=1))
+            found.place[on_edge < least] = np.nan
+            crossing = np.flatnonzero(np.isfinite(found.place))
+            edges, place, inward = _Edges.of(receivers, side[crossing]), found.place[crossing], found.inward[crossing]
             margin = _SNAP * size[source[edges.cell]] / np.maximum(edges.length, np.finfo(float).tiny)
             contoured |= np.isfinite(found.place)[number].any(axis=1)
-            found.place[crossed] = _off_the_ends(place + _WITHIN * margin * inward, inward, margin)
+            found.place[crossing] = _off_the_ends(place + _WITHIN * margin * inward, inward, margin)
             places = found.place[number]
             receivers, piece = cut_cells(receivers, places)
             near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
         on_contour = np.concatenate([mesh.triangles >= n for mesh, n in zip(receivers.fine, uncut, strict=True)])
         breaks = self._breaks(receivers, contoured, sight[source])
-        return replace(receivers, breaks=breaks, on_contour=on_contour), source
+        return Cut(replace(receivers, breaks=breaks, on_contour=on_contour), source, worth, crossed)
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
         """Cells (c,) with others around them from whose middles other lights are in sight (c,), or that are covered."""
@@ -230,33 +250,27 @@ class Contours:
         return np.asarray(near)
 
     def _follow(self, receivers: Receivers, number: Int64, side: Int64, near: Bool) -> _Crossings:
-        """Where contours cross the edges (e,) of each number (c, 3), on which sides (e,) lie; followed from the near
-        (c,) cells on."""
-        asked = np.zeros(len(side), dtype=bool)
-        found = _Crossings.none(len(asked))
+        """Where contours that matter cross the edges (e,) of each number (c, 3), on which sides (e,) lie; followed from
+        the near (c,) cells on, and from what is known."""
+        edges, found = _Edges.of(receivers, side), _Crossings.none(len(side))
+        asked, recalled = self._known_crossings.recall(edges.key)
+        found[asked] = _Crossings(*recalled)
+        near = near | np.isfinite(found.place)[number].any(axis=1)
         while True:
             fresh = np.unique(number[near])
             fresh = fresh[~asked[fresh]]
             if not len(fresh):
                 return found
             asked[fresh] = True
-            found[fresh] = self._find(receivers, _Edges.of(receivers, side[fresh]))
-            near = np.isfinite(found.place)[number].any(axis=1)
-
-    def _find(self, receivers: Receivers, edges: _Edges) -> _Crossings:
-        """Where contours that matter cross the edges."""
-        known, recalled = self._known.recall(edges.key)
-        found = _Crossings.none(len(known))
-        found[known] = recalled
-        fresh = np.flatnonzero(~known)
-        if len(fresh):
-            found[fresh] = self._crossings(receivers, edges.only(fresh))
-            self._known.remember(edges.key[fresh], found[fresh])
-        return found
+            found[fresh] = crossings = self._crossings(receivers, edges.only(fresh))
+            self._known_crossings.remember(edges.key[fresh], crossings.columns())
+            leads_on = np.zeros(len(side), dtype=bool)
+            leads_on[fresh] = np.isfinite(crossings.place)
+            near = leads_on[number].any(axis=1)
 
     def _crossings(self, receivers: Receivers, edges: _Edges) -> _Crossings:
-        """The same where nothing is known yet: outlines of what stands on the surface first, and shadows on edges that
-        none of these crosses."""
+        """Where they cross edges: outlines of what stands on the surface first, and shadows on edges that none of these
+        crosses."""
         seen = self._on_edges(receivers, edges, np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(edges.cell))))
         found = _Crossings.none(len(edges.cell))
         changes = seen[1:] ^ seen[:-1]
@@ -373,7 +387,7 @@ class Contours:
         missed, step = _off_the_line(light, places), np.minimum(np.ptp(light, axis=0), brings)
         matters = np.minimum(missed, brings) > np.maximum(_KINK * step, _CONTRAST * light.max(axis=0))
         matters &= missed > _SIGNIFICANT * noise
-        return _Crossings(np.where(matters, place, np.nan), np.zeros(len(place), dtype=np.int64), step)
+        return _Crossings(np.where(matters, place, np.nan), np.zeros(len(place)), step)
 
     def _outlines(self, receivers: Receivers, edges: _Edges, seen: Int64, interval: Int64, bits: Int64) -> _Crossings:
         """Where what stands on the surface crosses the edges, if it hides one side, or parts light from dark."""
@@ -391,7 +405,7 @@ class Contours:
         # What is hidden says nothing, so next to it all of the light may be wrong.
         step = np.where(look.outlines, np.maximum(one, other), np.abs(one - other))
         covered = seen[interval, np.arange(len(place))] >= _COVERED
-        inward = np.where(look.outlines & (bits == _COVERED), np.where(covered, -1, 1), 0)
+        inward = np.where(look.outlines & (bits == _COVERED), np.where(covered, -1.0, 1.0), 0.0)
         return _Crossings(np.where(look.outlines | parted, place, np.nan), inward, step)
 
     def _look(self, points: Points, reach: Float64, number: int) -> _Look:
@@ -424,16 +438,33 @@ class Contours:
         weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
         weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
         points = Points(receivers.cells, side // 3, weights)
+        broken = self._breaks_between(points)
+        breaks = np.zeros(3 * len(near), dtype=bool)
+        breaks[side.reshape(2, -1)[:, broken]] = True
+        return breaks.reshape(-1, 3)
+
+    def _breaks_between(self, points: Points) -> Bool:
+        """Whether light breaks (n,) between points (2 n,) on two sides of n places."""
+        ends = points.positions.reshape(2, -1, 3)
+        keys = key(ends, points.normals[: ends.shape[1]])
+        known, (recalled,) = self._known_breaks.recall(keys)
+        broken = np.zeros(len(known), dtype=bool)
+        broken[known] = recalled > 0.0
+        if not known.all():
+            fresh = ~known
+            broken[fresh] = found = self._seen_between(points.only(np.tile(fresh, 2)))
+            self._known_breaks.remember(keys[fresh], [found])
+        return broken
+
+    def _seen_between(self, points: Points) -> Bool:
+        """The same where nothing is known yet."""
         sight, look = self._workers.beside(
             partial(self._sight, points, None), partial(self._look, points, GAP * points.size, 1)
         )
         self.rays += look.rays
         one, other = sight.reshape(2, -1)
         parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
-        broken = _part(one, other) | parted | look.outlines
-        breaks = np.zeros(3 * len(near), dtype=bool)
-        breaks[side.reshape(2, -1)[:, broken]] = True
-        return breaks.reshape(-1, 3)
+        return np.asarray(_part(one, other) | parted | look.outlines)
 
 
 def _larger_beside(values: Float64, number: Int64) -> Float64:
@@ -456,7 +487,7 @@ def _off_the_line(light: Float64, places: Float64) -> Float64:
     return np.asarray(np.abs(light - line).max(axis=0))
 
 
-def _off_the_ends(place: Float64, inward: Int64, margin: Float64) -> Float64:
+def _off_the_ends(place: Float64, inward: Float64, margin: Float64) -> Float64:
     """Places (n,) at least so far (n,) from both ends of their edges; nan where there is no such place, or none is
     needed. What is covered may be cut off late, but not early: then its dark would show."""
     first, second = place < margin, place > 1.0 - margin

@@ -8,7 +8,7 @@ from .scene import Float64
 from .tessellation import Int64
 
 #: A split cell becomes four, and makes its neighbours become two or three.
-_MORE = 5
+MORE = 5
 
 
 def over_fair_share(weight: Float64, fair: float, room: int) -> Int64:
@@ -28,5 +28,5 @@ def until_allowed(weight: Float64, allowed: float, room: int) -> Int64:
 
 def _largest(weight: Float64, room: int) -> Int64:
     """Those of positive weight, the largest first, as many as there is room for."""
-    count = min(max(room // _MORE, 0), int(np.count_nonzero(weight > 0.0)))
+    count = min(max(room // MORE, 0), int(np.count_nonzero(weight > 0.0)))
     return np.argsort(-weight, kind="stable")[:count]

@@ -140,7 +140,7 @@ def test_nobody_samples_again_for_a_handful_of_triangles(build, monkeypatch):
 
     def crowded(bends, _):
         trial = bends._cut(0.0)
-        bends._limit = len(bends._source) + 10
+        bends._limit = len(bends._last.source) + 10
         return trial
 
     monkeypatch.setattr(Bends, "refine", crowded)
@@ -149,3 +149,15 @@ def test_nobody_samples_again_for_a_handful_of_triangles(build, monkeypatch):
     assert result.report.estimated_error["total"] > 0.02
     assert asked
     assert not any(asked)
+
+
+def test_faint_contours_leave_room_for_the_triangles_that_bright_light_calls_for(build):
+    """Slats throw forty faint shadows of a sun, whose cuts alone would take all the triangles there are to be had,
+    while a lamp close to the ground is far off with the coarse ones."""
+    ground = build.quad("ground", (-2, -2, 0), (4, 0, 0), (0, 4, 0))
+    slats = [build.quad(f"slat {k}", (-2 + k * 0.1, -2, 1), (0.05, 0, 0), (0, 4, 0), receives=False) for k in range(40)]
+    suns = SunLamp("sun", (0, 0, -1), (0.02, 0.02, 0.02)), PointLamp("lamp", (0.5, 0.5, 0.2), (1.0, 1.0, 1.0))
+    asked = Settings(triangles=2000, error=0.02, threads=2, effects={"bounces": False})
+    result = bake(Scene((ground, *slats), (build.grey,), suns), asked)
+    assert len(result.objects[0].triangles) <= 2000 * (1 + 2 / 16)
+    assert result.report.estimated_error["resolution"] < 0.1

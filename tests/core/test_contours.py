@@ -124,7 +124,7 @@ def test_a_shadow_that_is_soft_all_over_is_left_alone(build, workers):
     lamp = AreaLamp("lamp", (0, 0, 1.5), (0.9, 0, 0), (0, 0.9, 0), (0, 0, -1), (1.0,) * 3)
     scene = Scene((FLOOR, *plates), (GREY, BLACK), (lamp,))
     receivers, contours = begun(scene, 2000, build, workers)
-    cut = contours.cut(receivers)[0]
+    cut = contours.cut(receivers).receivers
     assert len(cut.cells) < 1.15 * len(receivers.cells)
 
 
@@ -139,7 +139,7 @@ def test_a_faint_light_does_not_hide_the_shadow_of_a_bright_one(build, workers):
     for lamps in (suns, suns[::-1]):
         scene = Scene((FLOOR, sail, *slats), (GREY, BLACK), lamps)
         receivers, contours = begun(scene, 200, build, workers)
-        cut, space = contours.cut(receivers)[0], receivers.space
+        cut, space = contours.cut(receivers).receivers, receivers.space
         across = (cut.cells.corners * space.metres + space.center)[..., 0]
         over = OFF * np.sqrt(2 * float(receivers.cells.area.max())) * space.metres
         assert not ((across.min(axis=1) < edge - over) & (across.max(axis=1) > edge + over)).any()
@@ -226,5 +226,5 @@ def test_a_shadow_that_matters_less_than_is_asked_is_not_cut(build, workers):
     receivers, contours = begun(scene, 200, build, workers)
     # Half of the sun's light is reflected, and one of about 200 cells is as large as this.
     step = LIT**2 * float(receivers.cells.area.max())
-    whole = [len(contours.cut(receivers, times * step)[0].cells) for times in (0.0, 0.9, 1.1)]
+    whole = [len(contours.cut(receivers, times * step).receivers.cells) for times in (0.0, 0.9, 1.1)]
     assert whole[0] == whole[1] > len(receivers.cells) == whole[2]
