@@ -13,10 +13,8 @@ from .check import check_cost, check_scene
 from .clock import Clock
 from .contours import Contours
 from .cost import calibrate
-from .direct.emitters import emitting_panels
 from .direct.illumination import DirectLight, Source
-from .direct.lamps import place
-from .direct.sky import divide_sky
+from .direct.sources import sources
 from .memory import Memory
 from .parallel import Workers
 from .patch_count import patches_wanted
@@ -30,7 +28,6 @@ from .refinement import Finer, FittedSurvey, Light, average_light, refine
 from .result import BakeResult
 from .scene import Scene
 from .settings import Settings
-from .sky import Sky
 from .surroundings import Surroundings, look_up
 from .survey import Survey
 from .transport import Transport, solve_halves
@@ -70,11 +67,13 @@ def bake(
             chosen = choose(scene, settings, pilot, effort)
             scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
-            others, of_sky, sky = sources(chosen, around, space)
+            others, of_sky, sky = sources(
+                scene, around, space, sky_lights=chosen.active("sky lights"), portals=chosen.active("portals")
+            )
             lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))
-            planned = price(chosen, settings, calibrate(pilot, settings.threads), fixed=effort is not None)
+            planned = price(chosen, settings, pilot, calibrate(pilot, settings.threads), fixed=effort is not None)
             check_cost(planned)
             effort = planned.effort
             clock.progress.expected = planned.seconds
@@ -123,15 +122,6 @@ def bake(
         memory.remember(given, settings, baked, light)
     with clock.stage("layers", 0.97):
         return baked.result(light, settings, clock)
-
-
-def sources(chosen: Plan, around: Scene, space: Space) -> tuple[list[Source], list[Source], Sky]:
-    """What light is asked for straight: lamps and emitting surfaces, and what of the sky; and the rest of the sky."""
-    scene = chosen.scene
-    others: list[Source] = [place(lamp, space) for lamp in scene.lamps]
-    others += emitting_panels(around, space)
-    sky, of_sky = divide_sky(scene, space, suns=chosen.active("sky lights"), portals=chosen.active("portals"))
-    return others, list[Source](of_sky), sky
 
 
 def told_apart(
@@ -188,11 +178,11 @@ def finer_where_it_matters(
         survey = begun_on(bends.refine(scene))
         survey.rays += bends.rays + contours.rays
 
-        def finer(earlier: Survey, found: FittedSurvey) -> Survey | None:
+        def finer(earlier: Survey, found: FittedSurvey) -> tuple[Survey, float] | None:
             cast = bends.rays + contours.rays
             split = bends.finer(earlier, found)
             earlier.rays += bends.rays + contours.rays - cast
-            return gone_on(earlier, split) if split else None
+            return (gone_on(earlier, split[0]), split[1]) if split else None
 
         return survey, finer
     survey = begun_on(receivers)

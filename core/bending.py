@@ -93,14 +93,14 @@ class Bends:
                 break
         return self._cut(least)
 
-    def finer(self, survey: Survey, found: FittedSurvey) -> Receivers | None:
-        """The same once more for a survey of what is there by now, and what was found in it; None where splitting as
-        many triangles as there is room for would bring too little."""
+    def finer(self, survey: Survey, found: FittedSurvey) -> tuple[Receivers, float] | None:
+        """The same once more for a survey of what is there by now, and what was found in it, and what share of their
+        error these triangles leave; None where splitting as many as there is room for would bring too little."""
         worst = self._worst(survey, found)
         if worst.gain < _WORTH:
             return None
         self._uncut = split_cells(self._uncut, worst.chosen)[0]
-        return self._cut(_CUT * worst.spared)
+        return self._cut(_CUT * worst.spared), float(np.sqrt(1.0 - worst.gain))
 
     def _cut(self, least: float) -> Receivers:
         """The triangles there are by now, cut along contours; least: as there, or more where there is no room."""

@@ -34,8 +34,9 @@ _PATIENCE = 1.0
 #: factor, of a cell in each fit.
 _LOOK, _AIM, _CHOOSE, _FORM_FACTOR, _FIT = 21.0, 70.0, 22.0, 52.0, 1000.0
 #: That one thread bears alone: of a form factor in the balance, of a cell in each fit, of a cell and a patch while they
-#: are split, of a cell that contours are looked for in, and of a triangle that is there already.
-_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _CONTOUR, _OWN = 25.0, 680.0, 1500.0, 5500.0, 2600.0, 1400.0
+#: are split, and of a triangle that is there already; of a cell that contours are looked for in, and one they cross.
+_BALANCE, _ASSEMBLE, _SPLIT_CELL, _SPLIT_PATCH, _OWN = 25.0, 680.0, 1500.0, 5500.0, 1400.0
+_CONTOUR, _CROSSED = 1100.0, 30_000.0
 #: Of any bake, however small, and of any round of finding where light bends.
 _FIXED, _ROUND = 2.6e7, 1.4e7
 #: Bytes held at once for each cell, patch and triangle that is there already.
@@ -46,7 +47,8 @@ _CELL_BYTES, _PATCH_BYTES, _OWN_BYTES = 1700.0, 15_000.0, 600.0
 class Work:
     """What a bake has to do. transport, gather, shadow: rays; cells: the triangles that light is fitted to; own: the
     triangles that the scene itself has; fits: how often the light is fitted to so many; contours: cells that they are
-    looked for in; rounds of finding where light bends; choices: of which lights to ask, one for each at each point."""
+    looked for in, crossed: those that they cross; rounds of finding where light bends; choices: of which lights to ask,
+    one for each at each point."""
 
     transport: float = 0.0
     gather: float = 0.0
@@ -56,6 +58,7 @@ class Work:
     own: int = 0
     fits: float = 1.0
     contours: float = 0.0
+    crossed: float = 0.0
     rounds: float = 0.0
     choices: float = 0.0
 
@@ -84,21 +87,20 @@ class Machine:
         shared = work.gather * _LOOK + work.shadow * _AIM + work.choices * _CHOOSE
         shared += factors * _FORM_FACTOR + work.cells * work.fits * _FIT
         alone = factors * _BALANCE + work.cells * (work.fits * _ASSEMBLE + _SPLIT_CELL)
-        alone += work.patches * _SPLIT_PATCH + work.contours * _CONTOUR + work.own * _OWN + bool(work.cells) * _FIXED
-        alone += work.rounds * _ROUND
+        alone += work.patches * _SPLIT_PATCH + work.own * _OWN + bool(work.cells) * _FIXED
+        alone += work.contours * _CONTOUR + work.crossed * _CROSSED + work.rounds * _ROUND
         return self.ray * (looks + work.transport) + self.number * (shared / self.threads + alone)
 
 
 def calibrate(pilot: Pilot, threads: int) -> Machine:
-    """Trace a few thousand rays on as many threads as the bake will have (0: all)."""
+    """Trace a few thousand rays from the receivers on as many threads as the bake will have (0: all)."""
     threads = thread_count(threads)
     patches, visibility = pilot.patches, pilot.visibility
     rng = stream(0, "calibration")
-    chosen = rng.choice(len(patches.area), size=_CALIBRATION // _LOOKS, p=patches.area / patches.area.sum())
-    chosen = np.repeat(chosen, _LOOKS)
+    points, normals = (np.repeat(v, _LOOKS, axis=0) for v in pilot.on_receivers(_CALIBRATION // _LOOKS, rng))
     directions = rng.normal(size=(_CALIBRATION, 3))
-    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True) + patches.normals[chosen]
-    origins = patches.corners[chosen].mean(axis=1) + 1e-4 * patches.normals[chosen]
+    directions = directions / np.linalg.norm(directions, axis=1, keepdims=True) + normals
+    origins = points + 1e-4 * normals
     rays = origins.astype(np.float32), directions.astype(np.float32)
     numbers, index, together = rng.random(_CALIBRATION), rng.permutation(_CALIBRATION), Barrier(threads)
 

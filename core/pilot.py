@@ -89,6 +89,15 @@ class Pilot:
         chosen = rng.choice(len(corners), size=count, p=area / area.sum())
         return _somewhere_in(corners[chosen], rng), normals[chosen]
 
+    def pairs_on_receivers(self, count: int, cells: int, rng: np.random.Generator) -> tuple[Float64, Float64, Float64]:
+        """Pairs of points (n, 3), spread at random over the receivers, in one triangle each and no further from each
+        other than they are in one of so many equal cells; and the normals (n, 3) there."""
+        corners, normals, area = self._receivers
+        chosen = rng.choice(len(corners), size=count, p=area / area.sum())
+        one, another = (_somewhere_in(corners[chosen], rng) for _ in range(2))
+        nearer = np.minimum(np.sqrt(area.sum() / cells / area[chosen]), 1.0)
+        return one, one + nearer[:, None] * (another - one), normals[chosen]
+
     def where_hit(self, path: Path, rng: np.random.Generator) -> tuple[Float64, Float64]:
         """A point of each triangle that was hit, and its normal on that side; of rays that hit something."""
         triangle = path.hit[path.hit >= 0]

@@ -7,10 +7,12 @@ from functools import cached_property
 
 import numpy as np
 
+from .contrast import Contrast, contrast
 from .cost import Machine, Work, calibrate
 from .direct.emitters import emitting_pieces
 from .direct.illumination import MOST_ASKED, MOST_CONTOURED
 from .direct.sky import split_bright
+from .direct.sources import sources
 from .effects import (
     LAMPS,
     choose_effects,
@@ -61,25 +63,23 @@ PRICED_ERRORS = (0.05, 0.02, 0.01, 0.005)
 #: Asked error from which on patches for rays grow fewer with its square, down to half, and nobody looks whether they
 #: leave more of it than they should: that costs what it brings.
 _ROUGH = 0.05
-#: How many times as many patches there are after those have been split that light breaks in: typical.
-_MORE_PATCHES = 1.6
+#: How many times as many patches there are after those have been split that light breaks in: typical. Where light is
+#: harsher than this, more are wanted, by its square: typical of a furnished room and of a stage.
+_MORE_PATCHES, _HARSH = 1.6, 0.25
 #: Openings are looked for where so large a part of the receivers sees little of the sky, and the rays of one point
 #: there tell of it with so much noise, relative to all light.
 _INSIDE, _SHOWS = 0.1, 0.1
-#: Cells that are split where light bends, at 2 %, and the power of the error with which they grow fewer: typical of
-#: those scenes.
-_CALLED, _CALLED_POWER = 8_000, 1.75
+#: Cells that are split where light bends, by the power of what the harshness of light is to the error: typical of those
+#: scenes.
+_CALLED, _CALLED_POWER = 190, 1.75
 #: Cells that there are in all where pools of light call for more, for each unit of unevenness and of light that has not
 #: bounced, over the error: typical of a hall, and of rooms, with 12 to 40 lamps.
 _POOLS = 4.7
 #: Where they are fewer than one in so many of the first cells, one round more finds them all: typical as well.
 _FEW_CALLED = 5.0
 #: Cells that triangles which are kept gain at most where light breaks, for each cell; and those that others gain where
-#: contours cut them, for each that they start from: typical.
-_MOST_CROSSED, _CUT = 0.25, 0.25
-#: Share of the light that has not bounced, which is typical too: only this bends much. Where it is less, what it does
-#: is less of the whole.
-_TYPICAL_DIRECT = 0.5
+#: contours cut them, for each that contours cross of those that they start from: typical.
+_MOST_CROSSED, _CUT = 0.25, 3.7
 #: Finding that takes so many rounds at most, passes over all cells in each, and rays of each point that look around.
 BEND_ROUNDS, BEND_PASSES, BEND_RAYS = 4, 4, 16
 #: Up to which asked error more samples hide the noise of triangles of many sizes, and how many times as many more than
@@ -167,7 +167,7 @@ def plan(scene: Scene, settings: Settings, effort: Effort | None = None) -> Plan
     """
     pilot = Pilot(scene)
     chosen = choose(scene, settings, pilot, effort)
-    return price(chosen, settings, calibrate(pilot, settings.threads), fixed=effort is not None)
+    return price(chosen, settings, pilot, calibrate(pilot, settings.threads), fixed=effort is not None)
 
 
 def choose(scene: Scene, settings: Settings, pilot: Pilot, effort: Effort | None = None) -> Plan:
@@ -177,10 +177,10 @@ def choose(scene: Scene, settings: Settings, pilot: Pilot, effort: Effort | None
     return Plan(scene, effects, effort or choose_effort(scene, settings), 0, {}, 0.0, 0.0)
 
 
-def price(chosen: Plan, settings: Settings, machine: Machine, *, fixed: bool = False) -> Plan:
-    """The chosen plan with its price, and thriftier where there is too little time for it, unless its effort is
-    fixed."""
-    prices, effort = _Prices(chosen, settings, machine), chosen.effort
+def price(chosen: Plan, settings: Settings, pilot: Pilot, machine: Machine, *, fixed: bool = False) -> Plan:
+    """The chosen plan with its price on a machine, as the pilot of the scene has found it, and thriftier where there is
+    too little time for it, unless its effort is fixed."""
+    prices, effort = _Prices(chosen, settings, pilot, machine), chosen.effort
     planned = prices.of(effort)
     if fixed or settings.seconds is None or planned.seconds <= settings.seconds:
         return planned
@@ -219,9 +219,9 @@ def plan_with_prices(
     pilot = Pilot(scene)
     chosen, machine = choose(scene, settings, pilot), calibrate(pilot, settings.threads)
     asked = {error: replace(settings, error=error, seconds=None) for error in errors}
-    prices = _Prices(chosen, asked[errors[0]], machine)
+    prices = _Prices(chosen, asked[errors[0]], pilot, machine)
     costs = {error: prices.of(choose_effort(chosen.scene, wish)) for error, wish in asked.items()}
-    return price(chosen, settings, machine), costs
+    return price(chosen, settings, pilot, machine), costs
 
 
 def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene, bool]:
@@ -245,9 +245,9 @@ def _look_for_sky(scene: Scene, settings: Settings, pilot: Pilot) -> tuple[Scene
 class _Prices:
     """Plans of one scene by effort."""
 
-    def __init__(self, chosen: Plan, settings: Settings, machine: Machine) -> None:
+    def __init__(self, chosen: Plan, settings: Settings, pilot: Pilot, machine: Machine) -> None:
         self._unpriced = chosen
-        self._pilot = Pilot(chosen.scene)
+        self._pilot, self._looks = Pilot(chosen.scene), pilot
         self._settings = settings
         self._machine = machine
         self._own = sum(len(o.triangles) for o in chosen.scene.objects)
@@ -275,9 +275,15 @@ class _Prices:
         cut, and what the asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            return (1.0 + _CUT) * self._coarse(effort) + self._called(effort)
+            coarse, cuts = self._coarse(effort), _CUT * self._contrast.crossed if self._lights_cut else 0.0
+            return coarse + min(cuts * coarse + self._called(effort), effort.triangles)
         crossed = 0.01 / effort.error if self._settings.tessellate else min(0.01 / effort.error, _MOST_CROSSED)
         return planned.cells + min(crossed * planned.cells, effort.growth * effort.triangles)
+
+    def _patches(self, effort: Effort) -> float:
+        """Wanted patches: more than there are first where light is harsh, if there may be."""
+        more = max((self._harshness / _HARSH) ** 2, 1.0)
+        return max(min(more * effort.patches, effort.most_patches), effort.patches)
 
     def _called(self, effort: Effort) -> float:
         """Cells that are added where light bends."""
@@ -287,7 +293,7 @@ class _Prices:
     def _called_by_light(self, effort: Effort) -> float:
         """The same if no triangle of the receivers' own were so small already."""
         straight = 1.0 - self._machine.reflected
-        shadows = _CALLED * (0.02 * min(straight / _TYPICAL_DIRECT, 1.0) / effort.error) ** _CALLED_POWER
+        shadows = _CALLED * (self._harshness / effort.error) ** _CALLED_POWER
         pools = _POOLS * self._unevenness * straight / effort.error - self._coarse(effort)
         return float(min(max(shadows, pools), effort.triangles))
 
@@ -303,6 +309,11 @@ class _Prices:
         only these are split."""
         return float(self._own_areas[self._own_areas * cells > 1.0].sum())
 
+    @property
+    def _lights_cut(self) -> bool:
+        """Whether lights are so few that triangles are cut along their shadows."""
+        return sum(self._lights.values()) <= MOST_CONTOURED
+
     @cached_property
     def _lights(self) -> dict[str, int]:
         """How many there are of each kind, those to choose from as many as they cost."""
@@ -313,6 +324,25 @@ class _Prices:
         chosen_from = planned.active("emitting surfaces") and not planned.effort.emitters_by_rays
         lights["emitting surfaces"] = len(emitting_pieces(scene)) or _TREE_COST * chosen_from
         return lights
+
+    @cached_property
+    def _contrast(self) -> Contrast:
+        """Of the light straight from lamps, emitting surfaces and what of the sky is asked for straight."""
+        chosen, scene = self._unpriced, self._unpriced.scene
+        others, of_sky, _ = sources(
+            scene,
+            scene.surroundings(),
+            self._looks.space,
+            sky_lights=chosen.active("sky lights"),
+            portals=chosen.active("portals"),
+        )
+        sky_by_rays = (1.0 - self._machine.closed) * np.pi * mean_of_sky(scene)
+        return contrast(self._looks, [*others, *of_sky], chosen.effort.lights, sky_by_rays)
+
+    @property
+    def _harshness(self) -> float:
+        """The same contrast, relative to all light, bounces too."""
+        return self._contrast.light * (1.0 - self._machine.reflected)
 
     @cached_property
     def _unevenness(self) -> float:
@@ -344,12 +374,12 @@ class _Prices:
         cells = self._adapted(planned)
         passes = self._passes(effort, cells)
         surveyed = self._surveyed(effort)
-        patches = _MORE_PATCHES * effort.patches if planned.looks_around else 0.0
+        patches = _MORE_PATCHES * self._patches(effort) if planned.looks_around else 0.0
         count = sum(self._lights.values())
         asked = effort.lights / count if count > MOST_ASKED else 1.0
         crossed = (1.0 - (1.0 - _CROSSED) ** count) * min(_UNCERTAIN / effort.error, 1.0) ** 2
         points = cells * (passes + effort.boundary_passes * crossed)
-        if surveyed and count <= MOST_CONTOURED:
+        if surveyed and self._lights_cut:
             points += _CONTOUR_POINTS * cells
         on_sides = 2 * SITES * patches * effort.shadow_rays_of_site
         per_light = asked * (effort.shadow_rays * (points + surveyed) + on_sides)
@@ -380,7 +410,9 @@ class _Prices:
         looked_at = surveyed / BEND_PASSES
         fits = 1 + min(passes / effort.passes - 1.0, 1.0) + looked_at / max(cells, 1.0)
         contours = looked_at + cells * float(np.clip(rounds - 1.0, 0.0, 1.0))
-        return {**works, REST: Work(cells=cells, own=self._own, fits=fits, contours=contours, rounds=rounds)}
+        crossing = self._contrast.crossed * contours if contours and self._lights_cut else 0.0
+        rest = Work(cells=cells, own=self._own, fits=fits, contours=contours, crossed=crossing, rounds=rounds)
+        return {**works, REST: rest}
 
     def _passes(self, effort: Effort, cells: float) -> float:
         if self._settings.error is None:

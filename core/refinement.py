@@ -42,8 +42,9 @@ _ALONE = 8_000
 _MOST_ROUNDS, _MOST_GROWTH = 3, 4
 
 
-#: Of a survey, and of what was found in it: one with finer triangles and as many passes' samples to recall, or None.
-Finer = Callable[[Survey, "FittedSurvey"], Survey | None]
+#: Of a survey, and of what was found in it: one with finer triangles and as many passes' samples to recall, and what
+#: share of the triangles' error it will leave; or None.
+Finer = Callable[[Survey, "FittedSurvey"], tuple[Survey, float] | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,14 +118,15 @@ def refine(
         with clock.stage("tessellate", 0.79 + 0.05 * round_number, light.error.total):
             split = finer(survey, found) if finer and _too_coarse(light.error, settings) else None
         left = seconds - clock.elapsed - (clock.seconds["fit"] - fits)
-        more = passes_wanted(tried, asked, LEFT_TO_TRIANGLES * asked if split else np.inf)
+        more = passes_wanted(tried, asked, split[1] if split else 1.0)
         more = int(min(more, max(left, 0.0) * passes / clock.seconds["gather"])) // 2 * 2
         if split is None and more < 2:
             break
         with clock.stage("gather", 0.8 + 0.05 * round_number, light.error.total):
             if split:
-                split.catch_up(survey.passes)
-                survey = split
+                finest, _ = split
+                finest.catch_up(survey.passes)
+                survey = finest
                 # What other triangles left tells nothing of what passes on these have lowered.
                 tried.clear()
             for _ in range(more):
@@ -151,16 +153,16 @@ def _too_coarse(error: ErrorEstimate, settings: Settings) -> bool:
     return settings.seconds is None and error.total > asked > 0.0 and error.resolution > LEFT_TO_TRIANGLES * asked
 
 
-def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float, resolution: float = np.inf) -> int:
+def passes_wanted(tried: list[tuple[int, ErrorEstimate]], asked: float, left: float = 1.0) -> int:
     """How many more passes, an even number, bring the total error to what is asked, or sampling to where it no longer
-    shows beside the rest. tried: how many passes there were at each fit, and the error they left; resolution: what
-    finer triangles will leave of it.
+    shows beside the rest. tried: how many passes there were at each fit, and the error they left; left: the share of
+    what the triangles leave of it that finer ones will.
 
     The squared sampling error is a / passes + b. What is fixed, b, is the noise of the patches, which no pass lowers;
     it is known from the second fit on.
     """
     passes, error = tried[-1]
-    rest = error.transport**2 + min(error.resolution, resolution) ** 2
+    rest = error.transport**2 + (left * error.resolution) ** 2
     target = max(asked**2 - rest, _HIDDEN * rest)
     sampling, fixed = error.sampling**2, 0.0
     if sampling <= target:
