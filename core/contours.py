@@ -30,7 +30,7 @@ from .parallel import Workers
 from .patches import Cells
 from .receivers import Receivers, cell_colours, cut_cells, numbered_edges, shared_edges
 from .sampling import stream
-from .scene import Bool, Float64, Scene
+from .scene import Bool, Float64, Int32, Scene
 from .surroundings import GAP, Surroundings
 from .tessellation import Int64
 from .visibility import offset_along
@@ -437,13 +437,14 @@ class Contours:
         side = np.concatenate([here[both, 0], _side(there[both])])
         weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
         weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
-        points = Points(receivers.cells, side // 3, weights)
-        broken = self._breaks_between(points)
+        broken = self._broken_between(Points(receivers.cells, side // 3, weights))
+        side = side.reshape(2, -1)
+        broken |= self._meets(receivers, near, side, receivers.cell_vertex[here[both] // 3, here[both] % 3])
         breaks = np.zeros(3 * len(near), dtype=bool)
-        breaks[side.reshape(2, -1)[:, broken]] = True
+        breaks[side[:, broken]] = True
         return breaks.reshape(-1, 3)
 
-    def _breaks_between(self, points: Points) -> Bool:
+    def _broken_between(self, points: Points) -> Bool:
         """Whether light breaks (n,) between points (2 n,) on two sides of n places."""
         ends = points.positions.reshape(2, -1, 3)
         keys = key(ends, points.normals[: ends.shape[1]])
@@ -465,6 +466,25 @@ class Contours:
         one, other = sight.reshape(2, -1)
         parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
         return np.asarray(_part(one, other) | parted | look.outlines)
+
+    def _meets(self, receivers: Receivers, near: Bool, side: Int64, ends: Int32) -> Bool:
+        """Sides (s,), of near (c,) cells on either of two sides (2, s) of them, that part a cell in full shadow from
+        another, with an end (s, 2) where full shadow meets full light.
+
+        There a hard shadow goes over into a strip, which is soft, and too thin at its beginning for what is on either
+        side to be told from it. In one value where they meet light would smear into dark, and dark into light.
+        """
+        cell = np.flatnonzero(near)
+        sight = np.zeros(len(near), dtype=np.int64)
+        sight[cell] = self._sight(Points(receivers.cells, cell, np.full((len(cell), 3), 1 / 3)), None)
+        corner, (one, other) = receivers.cell_vertex, side // 3
+        met = np.zeros(len(ends), dtype=bool)
+        for number in range(len(self._light.lights) if self._lights else 0):
+            whole, part = (sight >> _WHOLE + number & 1) > 0, (sight >> number & 1) > 0
+            dark, light = np.zeros((2, int(corner.max()) + 1), dtype=bool)
+            dark[corner[near & whole]], light[corner[near & ~part]] = True, True
+            met |= (whole[one] != whole[other]) & (dark & light)[ends].any(axis=1)
+        return met & near[one] & near[other]
 
 
 def _larger_beside(values: Float64, number: Int64) -> Float64:

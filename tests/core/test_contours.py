@@ -108,6 +108,30 @@ def test_soft_shadows_have_no_teeth_whether_wide_or_narrow(degrees, angle):
     assert len(baked.triangles) < 2900
 
 
+def beside_a_post(turn: float) -> np.ndarray:
+    """How far off light is (2, n) just beside the shadow of a post's edge, in full light and in full shadow, as a share
+    of the light. The sun's disc makes that edge sharp where the post stands, and 1 cm wide at its end."""
+    post = quad("post", (-0.6, -0.3, 0), (0, 0.6, 0), (0, 0, 1), surface=1, receives=False)
+    sun = SunLamp("sun", (1, turn, -1), (1.0,) * 3, angle=np.radians(0.25))
+    scene = Scene((FLOOR, post), (GREY, BLACK), (sun,))
+    floor = bake(scene, Settings(triangles=1500, error=0.02, threads=2)).objects[0]
+    along = np.array([1.0, turn])
+    across = 0.025 * np.array([-turn, 1.0]) / np.linalg.norm(along)
+    edge = np.array([-0.6, 0.3]) + np.linspace(0.05, 0.9, 341)[:, None] * along
+    lit = LIT / np.linalg.norm([1, turn, 1])
+    return np.array([shown(floor, edge + across) / lit - 1.0, shown(floor, edge - across) / lit])
+
+
+def test_light_does_not_smear_where_a_hard_shadow_grows_soft(monkeypatch):
+    """Where full light and full shadow meet in one value, each smears into the other, over all triangles around."""
+    turns = (-0.45, -0.3, 0.33, 0.45)
+    parted = np.array([beside_a_post(turn) for turn in turns])
+    monkeypatch.setattr(Contours, "_meets", lambda _self, _receivers, _near, side, _ends: np.zeros(side.shape[1], bool))
+    met = np.array([beside_a_post(turn) for turn in turns])
+    assert np.abs(parted).max() < np.abs(met).max() / 2
+    assert np.mean(parted**2) < np.mean(met**2) / 4
+
+
 def test_a_shadow_that_is_soft_all_over_is_left_alone(build, workers):
     """Under a lamp that is nearly as large as the floor a line shows the light along nearly any edge."""
     plates = [
