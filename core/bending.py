@@ -36,6 +36,9 @@ _KEPT = 0.25
 _CUT = 0.25
 #: What share of the squared error triangles that are split once more must take away: it takes samples and another fit.
 _WORTH = 0.15
+#: How many times as many cells as are allowed there are at most: what splits add is only foreseen, and contours of the
+#: same worth are cut together or not at all.
+_ABOUT = 1.1
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
 
@@ -67,8 +70,8 @@ class Bends:
     ) -> None:
         self.rays: Counter[str] = Counter()
         self._limit = limit
-        #: Before contours cut them, and as they were cut last.
-        self._uncut, self._last = receivers, Cut.none(receivers)
+        #: Before contours cut them, as they were cut last, and what a contour had to be worth then.
+        self._uncut, self._last, self._least = receivers, Cut.none(receivers), 0.0
         self._light = direct_light
         self._around = around and around.with_rays(BEND_RAYS, stream(seed, "bend patterns"))
         self._effort = effort
@@ -85,8 +88,8 @@ class Bends:
             found = fit_samples(survey, judge_samples(survey, scene, self._workers), self._workers)
             # The errors of small cells are known better: some room is left for those of later rounds.
             worst = self._worst(survey, found, 1.0 if number == BEND_ROUNDS - 1 else 0.5)
-            before, least = least, _CUT * worst.spared
-            if not worst.chosen.any() and least <= before:
+            least = _CUT * worst.spared
+            if not worst.chosen.any() and least <= self._least:
                 return trial
             self._uncut = split_cells(self._uncut, worst.chosen)[0]
             if worst.enough:
@@ -105,13 +108,14 @@ class Bends:
     def _cut(self, least: float) -> Receivers:
         """The triangles there are by now, cut along contours; least: as there, or more where there is no room."""
         self._last = self._contours.cut(self._uncut, least)
-        if len(self._last.source) > self._limit:
+        if len(self._last.source) > _ABOUT * self._limit:
             worth, pieces = self._last.worth, np.bincount(self._last.source, minlength=len(self._last.worth)) - 1
             by_worth = np.argsort(-worth, kind="stable")
-            fitting = np.count_nonzero(np.cumsum(pieces[by_worth]) <= self._limit - len(worth))
+            fitting = np.count_nonzero(len(worth) + np.cumsum(pieces[by_worth]) <= _ABOUT * self._limit)
             if fitting < len(worth):
                 least = float(np.nextafter(worth[by_worth[fitting]], np.inf))
                 self._last = self._contours.cut(self._uncut, least)
+        self._least = least
         return self._last.receivers
 
     def _surveyed(self, receivers: Receivers, number: int, earlier: Survey | None) -> Survey:
@@ -164,7 +168,7 @@ class Bends:
         cuts = np.append(0, np.cumsum(more[order]))[np.searchsorted(-begin[order], -worst, side="right")]
         splits = MORE * np.arange(1, len(worst) + 1)
         fits = splits / share + cuts <= self._limit - len(self._uncut.cells)
-        return MORE * int(np.count_nonzero(fits))
+        return MORE * int(np.count_nonzero(np.logical_and.accumulate(fits)))
 
     def _over_gaps(self, survey: Survey) -> Int64:
         """Cells of the survey that are too large for the gap that they bound: what samples there see counts for

@@ -193,7 +193,7 @@ class Contours:
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
         self._nothing_to_find = alone or (not self._lights and around is None)
         self._around = around and around.with_rays(_RAYS, stream(seed, "contour patterns"))
-        self._known_crossings, self._known_breaks = _Known(3), _Known(1)
+        self._known_crossings, self._known_breaks, self._known_middles = _Known(3), _Known(1), _Known(1)
         self._seed = seed
         self._workers = workers
 
@@ -424,7 +424,7 @@ class Contours:
 
     def _breaks(self, receivers: Receivers, near: Bool, sight: Int64) -> Bool | None:
         """Sides (c, 3) of cells with a light that is in sight as a whole on one side and hidden on the other, with an
-        outline between them, or with something that stands between them; None without any.
+        outline between them, with something that stands between them, or that `_meets` adds; None without any.
 
         They are looked for between near (c,) cells, and between others that have something else in sight (c,): a
         contour may run along their sides, and cross none.
@@ -475,16 +475,31 @@ class Contours:
         side to be told from it. In one value where they meet light would smear into dark, and dark into light.
         """
         cell = np.flatnonzero(near)
-        sight = np.zeros(len(near), dtype=np.int64)
-        sight[cell] = self._sight(Points(receivers.cells, cell, np.full((len(cell), 3), 1 / 3)), None)
+        middles, sight = self._middles(receivers, cell)
         corner, (one, other) = receivers.cell_vertex, side // 3
         met = np.zeros(len(ends), dtype=bool)
-        for number in range(len(self._light.lights) if self._lights else 0):
+        for number, source in enumerate(self._light.lights if self._lights else []):
             whole, part = (sight >> _WHOLE + number & 1) > 0, (sight >> number & 1) > 0
+            shines = source.share(middles.positions, middles.normals) > 0.0
+            in_shadow = np.zeros(len(near), dtype=bool)
+            in_shadow[cell[whole]] = True
             dark, light = np.zeros((2, int(corner.max()) + 1), dtype=bool)
-            dark[corner[near & whole]], light[corner[near & ~part]] = True, True
-            met |= (whole[one] != whole[other]) & (dark & light)[ends].any(axis=1)
+            dark[corner[cell[whole]]], light[corner[cell[shines & ~part]]] = True, True
+            met |= (in_shadow[one] != in_shadow[other]) & (dark & light)[ends].any(axis=1)
         return met & near[one] & near[other]
+
+    def _middles(self, receivers: Receivers, cell: Int64) -> tuple[Points, Int64]:
+        """The middles of cells (n,), and what is in sight (n,) of them."""
+        middles = Points(receivers.cells, cell, np.full((len(cell), 3), 1 / 3))
+        keys = key(middles.positions[None], middles.normals)
+        known, (recalled,) = self._known_middles.recall(keys)
+        sight = np.zeros(len(cell), dtype=np.int64)
+        sight[known] = recalled.astype(np.int64)
+        if not known.all():
+            fresh = ~known
+            sight[fresh] = found = self._sight(middles.only(fresh), None)
+            self._known_middles.remember(keys[fresh], [found.astype(np.float64)])
+        return middles, sight
 
 
 def _larger_beside(values: Float64, number: Int64) -> Float64:

@@ -25,8 +25,8 @@ _RAYS = 4
 
 @dataclass(frozen=True)
 class Contrast:
-    """light: the standard deviation of irradiance within cells, relative to its mean; crossed: the share of cells in
-    which not all points have the same sources in sight."""
+    """light: the standard deviation of irradiance within cells, relative to the mean of that and other light; crossed:
+    the share of cells in which not all points have the same sources in sight."""
 
     light: float
     crossed: float
@@ -48,8 +48,10 @@ def contrast(pilot: Pilot, lights: Sequence[Source], asked: int, other: float) -
     direct = DirectLight(lights, pilot.visibility, 0, asked)
     facing = np.tile(normals, (2, 1))
     light = direct.at(np.concatenate([one, another]), facing, facing, _RAYS, rng)
-    grey, noise = light.grey.reshape(2, -1), light.variance.mean(axis=1).sum() / len(one)
-    variance = (float(np.mean((grey[0] - grey[1]) ** 2)) - float(noise)) / 2.0
+    grey = light.grey.reshape(2, -1)
+    # All channels have the same noise.
+    noise = float(np.mean(np.sqrt(light.variance).mean(axis=1) ** 2))
+    variance = float(np.mean((grey[0] - grey[1]) ** 2)) / 2.0 - noise
     mean = float(grey.mean()) + other
     sees = light.signature.reshape(2, -1)
     crossed = float(np.mean(sees[0] != sees[1]))

@@ -329,15 +329,17 @@ class _Prices:
     def _contrast(self) -> Contrast:
         """Of the light straight from lamps, emitting surfaces and what of the sky is asked for straight."""
         chosen, scene = self._unpriced, self._unpriced.scene
-        others, of_sky, _ = sources(
+        others, of_sky, by_rays = sources(
             scene,
             scene.surroundings(),
             self._looks.space,
             sky_lights=chosen.active("sky lights"),
             portals=chosen.active("portals"),
         )
-        sky_by_rays = (1.0 - self._machine.closed) * np.pi * mean_of_sky(scene)
-        return contrast(self._looks, [*others, *of_sky], chosen.effort.lights, sky_by_rays)
+        other = (1.0 - self._machine.closed) * by_rays.mean_irradiance
+        if chosen.effort.emitters_by_rays:
+            other += power_by_area(replace(scene, lamps=()))
+        return contrast(self._looks, [*others, *of_sky], chosen.effort.lights, other)
 
     @property
     def _harshness(self) -> float:

@@ -43,6 +43,12 @@ class Sky:
             return self
         return Sky(self.rows, self.columns, (self.light * self.irradiance).astype(np.float32), np.eye(3))
 
+    @property
+    def mean_irradiance(self) -> float:
+        """W/m^2, the mean of the channels, where nothing else is in sight in any direction."""
+        light = self.light[: self.rows * self.columns].mean(axis=0)
+        return float((light @ self.irradiance).mean())
+
     def without(self, portals: list[Rectangle]) -> Sky:
         """The sky that shines elsewhere than through the portals."""
         dark = np.zeros_like(self.light[:1])

@@ -159,5 +159,6 @@ def test_faint_contours_leave_room_for_the_triangles_that_bright_light_calls_for
     suns = SunLamp("sun", (0, 0, -1), (0.02, 0.02, 0.02)), PointLamp("lamp", (0.5, 0.5, 0.2), (1.0, 1.0, 1.0))
     asked = Settings(triangles=2000, error=0.02, threads=2, effects={"bounces": False})
     result = bake(Scene((ground, *slats), (build.grey,), suns), asked)
-    assert len(result.objects[0].triangles) <= 2000 * (1 + 2 / 16)
+    # A tenth more than there are at first and may be added.
+    assert len(result.objects[0].triangles) <= 1.1 * 2000 * (1 + 2 / 16)
     assert result.report.estimated_error["resolution"] < 0.1

@@ -108,28 +108,24 @@ def test_soft_shadows_have_no_teeth_whether_wide_or_narrow(degrees, angle):
     assert len(baked.triangles) < 2900
 
 
-def beside_a_post(turn: float) -> np.ndarray:
-    """How far off light is (2, n) just beside the shadow of a post's edge, in full light and in full shadow, as a share
-    of the light. The sun's disc makes that edge sharp where the post stands, and 1 cm wide at its end."""
+@pytest.mark.parametrize("turn", [-0.45, -0.3, 0.2, 0.33, 0.45])
+def test_full_light_and_full_shadow_have_no_value_in_common(build, workers, turn):
+    """The shadow of a post's edge is hard where it stands, and as wide as the sun's disc of half a degree further on.
+    Between the two one value would smear light into the dark, over all triangles around."""
     post = quad("post", (-0.6, -0.3, 0), (0, 0.6, 0), (0, 0, 1), surface=1, receives=False)
-    sun = SunLamp("sun", (1, turn, -1), (1.0,) * 3, angle=np.radians(0.25))
-    scene = Scene((FLOOR, post), (GREY, BLACK), (sun,))
-    floor = bake(scene, Settings(triangles=1500, error=0.02, threads=2)).objects[0]
-    along = np.array([1.0, turn])
-    across = 0.025 * np.array([-turn, 1.0]) / np.linalg.norm(along)
-    edge = np.array([-0.6, 0.3]) + np.linspace(0.05, 0.9, 341)[:, None] * along
-    lit = LIT / np.linalg.norm([1, turn, 1])
-    return np.array([shown(floor, edge + across) / lit - 1.0, shown(floor, edge - across) / lit])
-
-
-def test_light_does_not_smear_where_a_hard_shadow_grows_soft(monkeypatch):
-    """Where full light and full shadow meet in one value, each smears into the other, over all triangles around."""
-    turns = (-0.45, -0.3, 0.33, 0.45)
-    parted = np.array([beside_a_post(turn) for turn in turns])
-    monkeypatch.setattr(Contours, "_meets", lambda _self, _receivers, _near, side, _ends: np.zeros(side.shape[1], bool))
-    met = np.array([beside_a_post(turn) for turn in turns])
-    assert np.abs(parted).max() < np.abs(met).max() / 2
-    assert np.mean(parted**2) < np.mean(met**2) / 4
+    sun = SunLamp("sun", (1, turn, -1), (1.0,) * 3, angle=np.radians(0.5))
+    receivers, contours = begun(Scene((FLOOR, post), (GREY, BLACK), (sun,)), 400, build, workers)
+    cut = contours.cut(receivers).receivers
+    middle = cut.cells.corners.mean(axis=1) * cut.space.metres + cut.space.center
+    # How far on, and how far from the edge on its lit side, beside how far the disc's rim reaches: the way from the
+    # post's edge is as long as the direction to the sun, and the disc seen at a slant.
+    along, way = middle[:, 0] + 0.6, np.sqrt(2.0 + turn**2)
+    off = (middle[:, 1] - 0.3 - turn * along) / np.sqrt(1.0 + turn**2)
+    reach = along * way * np.tan(np.radians(0.25)) * way
+    beside = (along > 0.0) & (along < 0.95) & (np.abs(off) < 0.3)
+    light, dark = (beside & (side * off > 1.5 * reach) for side in (1, -1))
+    vertex = cut.corner_vertex[cut.cells.element]
+    assert not np.intersect1d(vertex[light], vertex[dark]).size
 
 
 def test_a_shadow_that_is_soft_all_over_is_left_alone(build, workers):

@@ -8,7 +8,7 @@ import pytest
 from radiosity_baker.core.contrast import contrast
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.pilot import Pilot
-from radiosity_baker.core.scene import Scene, SunLamp
+from radiosity_baker.core.scene import AreaLamp, Scene, SunLamp
 
 #: Pairs that are looked at for one light, and how far apart they are in triangles that are half of all there is, by
 #: which they are moved together, as if in one of 750 cells.
@@ -59,3 +59,14 @@ def test_even_light_and_darkness_have_none(build):
     assert contrast(*striped(build, 1.0, slats=False), 16, 0.0).light == pytest.approx(0.0, abs=1e-6)
     assert contrast(*striped(build), 16, 0.0).light == 0.0
     assert contrast(*striped(build, 1.0, slats=False), 16, 0.0).crossed == 0.0
+
+
+def test_noise_is_no_contrast_whatever_its_colour(build):
+    """Under a lamp with size, of which slats hide parts: as much light in one channel as in all of them."""
+    seen = []
+    for power in ((10.0,) * 3, (30.0, 0.0, 0.0)):
+        pilot, _ = striped(build)
+        lamp = AreaLamp("lamp", (0, 0, 2), (0, 0, -1), (0.4, 0, 0), (0, 0.4, 0), power)
+        seen.append(contrast(pilot, [place(lamp, pilot.space)], 16, 0.0).light)
+    assert seen[0] > 0.0
+    assert seen[1] == pytest.approx(seen[0])

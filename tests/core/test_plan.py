@@ -181,9 +181,11 @@ def test_cost_is_positive_and_grows_with_what_is_asked(build):
     assert finer.effort.patches > plan(room, Settings(error=0.05)).effort.patches
 
 
-def test_asked_seconds_are_what_the_plan_says_where_that_is_possible(build):
+def test_asked_seconds_are_what_the_plan_says_where_that_is_possible(build, monkeypatch):
+    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 5e-9, 1.0, 1))
     room = build.furnished_room()
-    assert plan(room, Settings(error=None, seconds=1.5)).seconds == 1.5
+    half = plan(room, Settings()).seconds / 2
+    assert plan(room, Settings(error=None, seconds=half)).seconds == half
     hurried = plan(room, Settings(error=0.02, seconds=1e-6))
     assert hurried.seconds > 1e-6
     assert hurried.effort.triangles >= 1500
@@ -286,6 +288,25 @@ def test_harsh_light_calls_for_more_of_everything(build, monkeypatch):
     even, crossed, bright, brighter, brightest = seconds.values()
     assert even < crossed
     assert even < bright < brighter == brightest
+
+
+def test_contrast_counts_beside_the_light_that_rays_find(build, monkeypatch):
+    """Half of the rays meet the sky, of which a sun is asked for straight; and emitting surfaces that are too many."""
+    told = []
+    monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 1e-8, 0.5, 1))
+    monkeypatch.setattr(
+        "radiosity_baker.core.plan.contrast", lambda *given: told.append(given[3]) or Contrast(0.1, 0.05)
+    )
+    sunny = np.full((16, 32, 3), 0.25, dtype=np.float32)
+    sunny[12, 5:7] = 500.0
+    glow = Surface("glow", emission=(3.0,) * 3)
+    ball = build.sphere(level=2, surface=1)
+    ground = build.quad()
+    plan(Scene((ground,), (build.grey,), sky=(0.5,) * 3), Settings())
+    plan(Scene((ground,), (build.grey,), sky=SkyMap(sunny)), Settings())
+    plan(Scene((ground, ball), (build.grey, glow)), Settings())
+    area = [float(triangle_geometry(o.vertices[o.triangles])[1].sum()) for o in (ground, ball)]
+    assert told == pytest.approx([0.25 * np.pi, 0.125 * np.pi, 3.0 * np.pi * area[1] / sum(area)], rel=0.02)
 
 
 def test_pools_of_light_call_for_more_cells(build, monkeypatch):
