@@ -14,26 +14,23 @@ edge shows the light about as well: a shadow that is soft over all of it.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .breaks import Breaks
 from .convexity import nothing_stands_between
-from .direct.illumination import MOST_CONTOURED, DirectLight
-from .gather import Points, gather_direct
-from .keys import key
+from .direct.illumination import DirectLight
+from .gather import Points
+from .keys import Known, key
 from .parallel import Workers
 from .patches import Cells
-from .receivers import Receivers, cell_colours, cut_cells, numbered_edges, shared_edges
-from .sampling import stream
-from .scene import Bool, Float64, Int32, Scene
+from .receivers import Receivers, cell_colours, cut_cells, numbered_edges
+from .scene import Bool, Float64, Scene
+from .sights import BARRED, COVERED, WHOLE, Sights
 from .surroundings import GAP, Surroundings
 from .tessellation import Int64
-from .visibility import offset_along
 
 #: Where edges are looked at, from one end to the other; and how far inside the triangle, relative to its height.
 _PLACES = np.array([0.02, 0.26, 0.5, 0.74, 0.98])
@@ -54,17 +51,6 @@ _SHADOWS = 3
 _BESIDE = 0.25
 #: What stands on a surface, however thin, counts when light differs by this share on its two sides.
 _PARTED = 0.5
-#: How far beside a side of a cell, relative to its height, it shows what is on either side.
-_BESIDE_SIDE = 0.1
-#: Rays that tell how much light there is, and whether a point is inside a solid.
-_SHADOW_RAYS, _RAYS = 16, 16
-#: The ends of a way along a surface are left out, lest it meets what bounds the surface.
-_BARRED_UP_TO = 0.98
-#: Points in a chunk; a number of streams that nothing else uses.
-_CHUNK, _STREAM = 4096, 4_000_000
-#: What is in sight of a point is a number: a bit for each light of which something is hidden, one for each that is
-#: hidden as a whole, one for what stands between it and the first end of an edge, and one for being covered.
-_WHOLE, _BARRED, _COVERED = MOST_CONTOURED, 1 << 2 * MOST_CONTOURED, 1 << 2 * MOST_CONTOURED + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,17 +95,6 @@ class _Edges:
 
 
 @dataclass(frozen=True, eq=False)
-class _Look:
-    """On two sides of places: light (2, n), which is indirect; outlines (n,): where one side is inside a solid or has
-    something close above it, and the other has nothing within twice that, so that between them there is no slope; rays
-    cast, by purpose."""
-
-    light: Float64
-    outlines: Bool
-    rays: Counter[str]
-
-
-@dataclass(frozen=True, eq=False)
 class _Crossings:
     """Of edges (e,): a place from the first end to the second where a contour that matters crosses each, nan where none
     does; where from there what is covered lies: 1 towards the second end, -1 towards the first, 0 on neither side; and
@@ -159,43 +134,24 @@ class Cut:
         return cls(receivers, np.arange(count), np.zeros(count), np.zeros(count, dtype=np.int64))
 
 
-class _Known:
-    """What has been found somewhere, by keys: most of it is asked for again after some cells were split."""
-
-    def __init__(self, columns: int) -> None:
-        self._keys, self._found = np.zeros(0), np.zeros((columns, 0))
-
-    def recall(self, keys: Float64) -> tuple[Bool, Float64]:
-        """Which of the keys (n,) are known, and what (columns, m) was found at those."""
-        at = np.searchsorted(self._keys, keys)
-        known = np.zeros(len(keys), dtype=bool)
-        inside = at < len(self._keys)
-        known[inside] = self._keys[at[inside]] == keys[inside]
-        return known, self._found[:, at[known]]
-
-    def remember(self, keys: Float64, found: Sequence[NDArray[Any]]) -> None:
-        self._keys, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
-        self._found = np.concatenate([self._found, found], axis=1)[:, first]
-
-
 class Contours:
-    """Cuts cells along the contours of lights and solids. rays: cast so far, by purpose."""
+    """Cuts cells along the contours of lights and solids."""
 
     def __init__(
         self, scene: Scene, direct_light: DirectLight, around: Surroundings | None, seed: int, workers: Workers
     ) -> None:
-        self.rays: Counter[str] = Counter()
         self._scene = scene
-        self._light = direct_light
-        shading = [light for light in direct_light.lights if light.casts_shadow]
-        self._lights = bool(shading) and len(direct_light.lights) <= MOST_CONTOURED
+        self._sights = Sights(direct_light, around, seed, workers)
+        self._breaks = Breaks(self._sights)
+        self._known = Known(3)
         # A sheet may lie close above another, and still nothing stand between either and a lamp.
         alone = len(scene.objects) == 1 and nothing_stands_between(scene)
-        self._nothing_to_find = alone or (not self._lights and around is None)
-        self._around = around and around.with_rays(_RAYS, stream(seed, "contour patterns"))
-        self._known_crossings, self._known_breaks, self._known_middles = _Known(3), _Known(1), _Known(1)
-        self._seed = seed
-        self._workers = workers
+        self._nothing_to_find = alone or (not self._sights.shadows and around is None)
+
+    @property
+    def rays(self) -> Counter[str]:
+        """Cast so far, by purpose."""
+        return self._sights.rays
 
     def cut(self, receivers: Receivers, least: float = 0.0) -> Cut:
         """The receivers with cells cut along the contours. least: a shadow is left alone where it is worth less, as
@@ -206,7 +162,7 @@ class Contours:
             return cut
         source, worth, crossed = cut.source, cut.worth, cut.crossed
         middles = Points(receivers.cells, source, np.full((len(source), 3), 1 / 3))
-        sight = self._sight(middles, GAP * middles.size)
+        sight = self._sights.sight(middles, GAP * middles.size)
         near = self._borders(receivers, middles, sight)
         size = np.sqrt(2.0 * receivers.cells.area)
         uncut = [len(mesh.vertices) for mesh in receivers.fine]
@@ -232,7 +188,7 @@ class Contours:
             receivers, piece = cut_cells(receivers, places)
             near, contoured, source = np.isfinite(places).any(axis=1)[piece], contoured[piece], source[piece]
         on_contour = np.concatenate([mesh.triangles >= n for mesh, n in zip(receivers.fine, uncut, strict=True)])
-        breaks = self._breaks(receivers, contoured, sight[source])
+        breaks = self._breaks.between(receivers, contoured, sight[source])
         return Cut(replace(receivers, breaks=breaks, on_contour=on_contour), source, worth, crossed)
 
     def _borders(self, receivers: Receivers, middles: Points, sight: Int64) -> Bool:
@@ -246,14 +202,14 @@ class Contours:
             np.maximum.at(high, corner[:, k], sight)
         near = (low != high)[corner].any(axis=1)
         for k in range(3):
-            near |= self._barred(middles, cells.corners[:, k])
+            near |= self._sights.barred(middles, cells.corners[:, k])
         return np.asarray(near)
 
     def _follow(self, receivers: Receivers, number: Int64, side: Int64, near: Bool) -> _Crossings:
         """Where contours that matter cross the edges (e,) of each number (c, 3), on which sides (e,) lie; followed from
         the near (c,) cells on, and from what is known."""
         edges, found = _Edges.of(receivers, side), _Crossings.none(len(side))
-        asked, recalled = self._known_crossings.recall(edges.key)
+        asked, recalled = self._known.recall(edges.key)
         found[asked] = _Crossings(*recalled)
         near = near | np.isfinite(found.place)[number].any(axis=1)
         while True:
@@ -263,7 +219,7 @@ class Contours:
                 return found
             asked[fresh] = True
             found[fresh] = crossings = self._crossings(receivers, edges.only(fresh))
-            self._known_crossings.remember(edges.key[fresh], crossings.columns())
+            self._known.remember(edges.key[fresh], crossings.columns())
             leads_on = np.zeros(len(side), dtype=bool)
             leads_on[fresh] = np.isfinite(crossings.place)
             near = leads_on[number].any(axis=1)
@@ -275,7 +231,7 @@ class Contours:
         found = _Crossings.none(len(edges.cell))
         changes = seen[1:] ^ seen[:-1]
         # Where something is covered, nothing else that stands there counts.
-        bits = np.where((changes >= _COVERED).any(axis=0), _COVERED, _BARRED)
+        bits = np.where((changes >= COVERED).any(axis=0), COVERED, BARRED)
         differs = (changes & bits) != 0
         some = np.flatnonzero(differs.any(axis=0))
         if len(some):
@@ -299,8 +255,8 @@ class Contours:
         irradiance (e,) that this light brings with nothing in the way."""
         bits, interval = np.zeros((2, len(edges.cell)), dtype=np.int64)
         brings, largest = np.zeros((2, len(edges.cell)))
-        for number, light in enumerate(self._light.lights if self._lights else []):
-            hidden = (seen >> number & 1) + (seen >> _WHOLE + number & 1)
+        for number, light in enumerate(self._sights.light.lights if self._sights.shadows else []):
+            hidden = (seen >> number & 1) + (seen >> WHOLE + number & 1)
             change = np.abs(np.diff(hidden, axis=0))
             some = np.flatnonzero(change.any(axis=0))
             if not len(some):
@@ -311,7 +267,7 @@ class Contours:
             step = share * change[where, some]
             more = step > largest[some]
             some = some[more]
-            bits[some], interval[some] = 1 << number | 1 << _WHOLE + number, where[more]
+            bits[some], interval[some] = 1 << number | 1 << WHOLE + number, where[more]
             brings[some], largest[some] = share[more], step[more]
         return bits, interval, brings
 
@@ -333,42 +289,13 @@ class Contours:
     def _on_edges(self, receivers: Receivers, edges: _Edges, places: Float64, asked: Int64 | None = None) -> Int64:
         """What is in sight (p, e) at places (p, e) of the edges; only what the bits (e,) ask for, if given."""
         points = edges.at(places, receivers.cells)
-        solids = asked is None or bool((asked >= _BARRED).any())
-        lights = None if asked is None else np.tile(asked | asked >> _WHOLE, len(places))
-        sight = self._sight(points, GAP * np.tile(edges.length, len(places)) if solids else None, lights)
+        solids = asked is None or bool((asked >= BARRED).any())
+        lights = None if asked is None else np.tile(asked | asked >> WHOLE, len(places))
+        sight = self._sights.sight(points, GAP * np.tile(edges.length, len(places)) if solids else None, lights)
         if solids:
             start = edges.at(np.full(places.shape, _PLACES[0]), receivers.cells)
-            sight = sight + _BARRED * self._barred(start, points.positions)
+            sight = sight + BARRED * self._sights.barred(start, points.positions)
         return sight.reshape(places.shape)
-
-    def _barred(self, points: Points, targets: Float64) -> Bool:
-        """Whether something stands on the surface between points and targets (n, 3) on it."""
-        origins = offset_along(points.positions, points.normals)
-        ways = (_BARRED_UP_TO * (targets - points.positions)).astype(np.float32)
-        long = np.flatnonzero(np.einsum("nk,nk->n", ways, ways) > 0)
-        barred = np.zeros(len(targets), dtype=bool)
-        barred[long] = ~self._light.visibility.unblocked_along(origins[long], ways[long])
-        self.rays["contact"] += len(long)
-        return barred
-
-    def _sight(self, points: Points, reach: Float64 | None, asked: Int64 | None = None) -> Int64:
-        """What is in sight (n,) of each point; with a reach (n,), also whether it is covered. asked (n,): bits of the
-        lights to look for, None for all."""
-
-        def work(_: int, part: slice) -> tuple[Int64, Counter[str]]:
-            where = points.positions[part], points.normals[part]
-            sight, rays = np.zeros(len(where[0]), dtype=np.int64), Counter[str]()
-            if self._lights:
-                some, whole, rays["shadow"] = self._light.shadows(*where, None if asked is None else asked[part])
-                sight = some | whole << _WHOLE
-            if reach is not None and self._around is not None:
-                sight += _COVERED * self._around.hemispheres.beneath(*where, reach[part])
-                rays["contact"] += 2 * len(sight)
-            return sight, rays
-
-        found = [*self._workers.map(work, len(points.positions), _CHUNK)]
-        self.rays += sum((rays for _, rays in found), Counter())
-        return np.concatenate([*(sight for sight, _ in found), np.zeros(0, np.int64)])
 
     def _shadows(
         self, receivers: Receivers, edges: _Edges, seen: Int64, interval: Int64, bits: Int64, brings: Float64
@@ -378,8 +305,8 @@ class Contours:
         beside = np.clip(np.stack([place - _NEAR, place + _NEAR]), _PLACES[0], _PLACES[-1])
         places = np.concatenate([np.broadcast_to(_PLACES[:, None], (len(_PLACES), len(place))), beside])
         points = edges.at(places, receivers.cells)
-        found = gather_direct(points, self._light, _SHADOW_RAYS, self._seed, _STREAM, self._workers)
-        self.rays += found.rays
+        found = self._sights.direct(points, 0)
+        self._sights.rays += found.rays
         light = found.grey.reshape(places.shape)
         # That of all places together: of a single one the rays hardly know it.
         noise = np.sqrt(found.variance.mean(axis=1).reshape(places.shape).mean(axis=0))
@@ -394,112 +321,19 @@ class Contours:
         place = self._place(receivers, edges, seen, interval, bits)
         beside = np.clip(np.stack([place - _BESIDE, place + _BESIDE]), _PLACES[0], _PLACES[-1])
         points = edges.at(beside, receivers.cells)
-        found, look = self._workers.beside(
-            partial(gather_direct, points, self._light, _SHADOW_RAYS, self._seed, _STREAM + 1, self._workers),
-            partial(self._look, points, GAP * np.tile(edges.length, 2), 0),
+        found, look = self._sights.workers.beside(
+            partial(self._sights.direct, points, 1),
+            partial(self._sights.look, points, GAP * np.tile(edges.length, 2), 0),
         )
-        self.rays += found.rays + look.rays
+        self._sights.rays += found.rays + look.rays
         one, other = found.grey.reshape(2, -1) + look.light
-        parted = self._barred(points.only(slice(0, len(place))), points.positions[len(place) :])
+        parted = self._sights.barred(points.only(slice(0, len(place))), points.positions[len(place) :])
         parted &= np.abs(one - other) > _PARTED * np.maximum(one, other)
         # What is hidden says nothing, so next to it all of the light may be wrong.
         step = np.where(look.outlines, np.maximum(one, other), np.abs(one - other))
-        covered = seen[interval, np.arange(len(place))] >= _COVERED
-        inward = np.where(look.outlines & (bits == _COVERED), np.where(covered, -1.0, 1.0), 0.0)
+        covered = seen[interval, np.arange(len(place))] >= COVERED
+        inward = np.where(look.outlines & (bits == COVERED), np.where(covered, -1.0, 1.0), 0.0)
         return _Crossings(np.where(look.outlines | parted, place, np.nan), inward, step)
-
-    def _look(self, points: Points, reach: Float64, number: int) -> _Look:
-        """Looks around from points (2 n,) on two sides of n places, of which something within reach (2 n,) above them
-        hides the light."""
-        around = self._around
-        if around is None:
-            return _Look(np.zeros((2, len(reach) // 2)), np.zeros(len(reach) // 2, dtype=bool), Counter())
-        arriving, enclosed, rays = around.look(points, self._seed, _STREAM + number, self._workers)
-        near, far = (
-            around.hemispheres.covered(points.positions, points.normals, times * reach) for times in (1.0, 2.0)
-        )
-        hidden, open_ = (enclosed | near).reshape(2, -1), ~(enclosed | far).reshape(2, -1)
-        outlines = (hidden & open_[::-1]).any(axis=0)
-        return _Look(arriving.reshape(2, -1), outlines, rays + Counter(contact=2 * len(reach)))
-
-    def _breaks(self, receivers: Receivers, near: Bool, sight: Int64) -> Bool | None:
-        """Sides (c, 3) of cells with a light that is in sight as a whole on one side and hidden on the other, with an
-        outline between them, with something that stands between them, or that `_meets` adds; None without any.
-
-        They are looked for between near (c,) cells, and between others that have something else in sight (c,): a
-        contour may run along their sides, and cross none.
-        """
-        here, there = shared_edges(receivers.cell_vertex)
-        one, other = here[:, 0] // 3, there[:, 0] // 3
-        both = (near[one] & near[other]) | (~near[one] & ~near[other] & _part(sight[one], sight[other]))
-        if not both.any():
-            return None
-        side = np.concatenate([here[both, 0], _side(there[both])])
-        weights = np.full((len(side), 3), (1.0 - _BESIDE_SIDE) / 2.0)
-        weights[np.arange(len(side)), (side + 2) % 3] = _BESIDE_SIDE
-        broken = self._broken_between(Points(receivers.cells, side // 3, weights))
-        side = side.reshape(2, -1)
-        broken |= self._meets(receivers, near, side, receivers.cell_vertex[here[both] // 3, here[both] % 3])
-        breaks = np.zeros(3 * len(near), dtype=bool)
-        breaks[side[:, broken]] = True
-        return breaks.reshape(-1, 3)
-
-    def _broken_between(self, points: Points) -> Bool:
-        """Whether light breaks (n,) between points (2 n,) on two sides of n places."""
-        ends = points.positions.reshape(2, -1, 3)
-        keys = key(ends, points.normals[: ends.shape[1]])
-        known, (recalled,) = self._known_breaks.recall(keys)
-        broken = np.zeros(len(known), dtype=bool)
-        broken[known] = recalled > 0.0
-        if not known.all():
-            fresh = ~known
-            broken[fresh] = found = self._seen_between(points.only(np.tile(fresh, 2)))
-            self._known_breaks.remember(keys[fresh], [found])
-        return broken
-
-    def _seen_between(self, points: Points) -> Bool:
-        """The same where nothing is known yet."""
-        sight, look = self._workers.beside(
-            partial(self._sight, points, None), partial(self._look, points, GAP * points.size, 1)
-        )
-        self.rays += look.rays
-        one, other = sight.reshape(2, -1)
-        parted = self._barred(points.only(slice(0, len(one))), points.positions[len(one) :])
-        return np.asarray(_part(one, other) | parted | look.outlines)
-
-    def _meets(self, receivers: Receivers, near: Bool, side: Int64, ends: Int32) -> Bool:
-        """Sides (s,), of near (c,) cells on either of two sides (2, s) of them, that part a cell in full shadow from
-        another, with an end (s, 2) where full shadow meets full light.
-
-        There a hard shadow goes over into a strip, which is soft, and too thin at its beginning for what is on either
-        side to be told from it. In one value where they meet light would smear into dark, and dark into light.
-        """
-        cell = np.flatnonzero(near)
-        middles, sight = self._middles(receivers, cell)
-        corner, (one, other) = receivers.cell_vertex, side // 3
-        met = np.zeros(len(ends), dtype=bool)
-        for number, source in enumerate(self._light.lights if self._lights else []):
-            whole, part = (sight >> _WHOLE + number & 1) > 0, (sight >> number & 1) > 0
-            shines = source.share(middles.positions, middles.normals) > 0.0
-            in_shadow = np.zeros(len(near), dtype=bool)
-            in_shadow[cell[whole]] = True
-            dark, light = np.zeros((2, int(corner.max()) + 1), dtype=bool)
-            dark[corner[cell[whole]]], light[corner[cell[shines & ~part]]] = True, True
-            met |= (in_shadow[one] != in_shadow[other]) & (dark & light)[ends].any(axis=1)
-        return met & near[one] & near[other]
-
-    def _middles(self, receivers: Receivers, cell: Int64) -> tuple[Points, Int64]:
-        """The middles of cells (n,), and what is in sight (n,) of them."""
-        middles = Points(receivers.cells, cell, np.full((len(cell), 3), 1 / 3))
-        keys = key(middles.positions[None], middles.normals)
-        known, (recalled,) = self._known_middles.recall(keys)
-        sight = np.zeros(len(cell), dtype=np.int64)
-        sight[known] = recalled.astype(np.int64)
-        if not known.all():
-            fresh = ~known
-            sight[fresh] = found = self._sight(middles.only(fresh), None)
-            self._known_middles.remember(keys[fresh], [found.astype(np.float64)])
-        return middles, sight
 
 
 def _larger_beside(values: Float64, number: Int64) -> Float64:
@@ -507,12 +341,6 @@ def _larger_beside(values: Float64, number: Int64) -> Float64:
     larger = np.zeros(int(number.max()) + 1)
     np.maximum.at(larger, number.ravel(), np.repeat(values, 3))
     return larger
-
-
-def _part(one: Int64, other: Int64) -> Bool:
-    """Whether a light is in sight as a whole on one side and hidden on the other, or one of them is covered: (n,)."""
-    lights = (1 << _WHOLE) - 1
-    return np.asarray(((one >> _WHOLE & ~other | other >> _WHOLE & ~one) & lights | (one ^ other) & _COVERED) > 0)
 
 
 def _off_the_line(light: Float64, places: Float64) -> Float64:
@@ -528,9 +356,3 @@ def _off_the_ends(place: Float64, inward: Float64, margin: Float64) -> Float64:
     first, second = place < margin, place > 1.0 - margin
     place = np.where(first & (inward > 0), margin, np.where(second & (inward < 0), 1.0 - margin, place))
     return np.where((place < margin) | (place > 1.0 - margin) | (margin > 0.4), np.nan, place)
-
-
-def _side(ends: Int64) -> Int64:
-    """The side (n,), 3 t + i from corner i to the next, whose ends are two corners (n, 2) of a triangle t."""
-    first, second = ends.T
-    return np.where((first % 3 + 1) % 3 == second % 3, first, second)

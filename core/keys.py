@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .patches import Cells
-from .scene import Float64
+from .scene import Bool, Float64
 from .tessellation import Int64
 
 #: Irrational, so that no sum of places on a grid is another's.
@@ -36,3 +38,22 @@ def same_cells(cells: Cells, earlier: Cells) -> tuple[Int64, Int64]:
     at = np.minimum(np.searchsorted(there, here, sorter=order), len(there) - 1)
     same = np.flatnonzero(there[order[at]] == here)
     return same, order[at[same]]
+
+
+class Known:
+    """What has been found somewhere, by keys: most of it is asked for again after some cells were split."""
+
+    def __init__(self, columns: int) -> None:
+        self._keys, self._found = np.zeros(0), np.zeros((columns, 0))
+
+    def recall(self, keys: Float64) -> tuple[Bool, Float64]:
+        """Which of the keys (n,) are known, and what (columns, m) was found at those."""
+        at = np.searchsorted(self._keys, keys)
+        known = np.zeros(len(keys), dtype=bool)
+        inside = at < len(self._keys)
+        known[inside] = self._keys[at[inside]] == keys[inside]
+        return known, self._found[:, at[known]]
+
+    def remember(self, keys: Float64, found: Sequence[NDArray[Any]]) -> None:
+        self._keys, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)
+        self._found = np.concatenate([self._found, found], axis=1)[:, first]
