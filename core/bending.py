@@ -37,8 +37,8 @@ _CUT = 0.25
 #: What share of the squared error triangles that are split once more must take away: it takes samples and another fit.
 _WORTH = 0.15
 #: How many times as many cells as are allowed there are at most: what splits add is only foreseen, and contours of the
-#: same worth are cut together or not at all.
-_ABOUT = 1.1
+#: same worth, but for rounding, are cut together or not at all.
+_ABOUT, _SAME = 1.1, 1.01
 #: The smallest cell that is split, as a share of the area that each of the allowed number of equal cells would have.
 _SMALLEST = 4.0**-3
 
@@ -113,7 +113,7 @@ class Bends:
             by_worth = np.argsort(-worth, kind="stable")
             fitting = np.count_nonzero(len(worth) + np.cumsum(pieces[by_worth]) <= _ABOUT * self._limit)
             if fitting < len(worth):
-                least = float(np.nextafter(worth[by_worth[fitting]], np.inf))
+                least = _SAME * float(worth[by_worth[fitting]])
                 self._last = self._contours.cut(self._uncut, least)
         self._least = least
         return self._last.receivers

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 from radiosity_baker.core.bake import bake
+from radiosity_baker.core.bending import Bends
 from radiosity_baker.core.comparison import locate
 from radiosity_baker.core.contours import Contours
 from radiosity_baker.core.direct.illumination import DirectLight
 from radiosity_baker.core.direct.lamps import place
 from radiosity_baker.core.patches import triangle_geometry, unit_space
+from radiosity_baker.core.plan import choose_effort
 from radiosity_baker.core.receivers import Receivers, fit_vertices, make_receivers
 from radiosity_baker.core.result import BakedObject
 from radiosity_baker.core.scene import AreaLamp, Scene, SunLamp, Surface
@@ -248,3 +250,17 @@ def test_a_shadow_that_matters_less_than_is_asked_is_not_cut(build, workers):
     step = LIT**2 * float(receivers.cells.area.max())
     whole = [len(contours.cut(receivers, times * step).receivers.cells) for times in (0.0, 0.9, 1.1)]
     assert whole[0] == whole[1] > len(receivers.cells) == whole[2]
+
+
+def test_a_shadow_is_cut_as_a_whole_or_not_at_all(build, workers):
+    """One cell more than are allowed does not cost a part of it, which would end amid the surface; and a tenth more is
+    too many."""
+    sail = quad("sail", (-4, 0.013, 1), (8, 0, 0), (0, 8, 0), surface=1, receives=False)
+    scene = Scene((FLOOR, sail), (GREY, BLACK), (SunLamp("sun", (0, 0, -1), (1.0,) * 3),))
+    receivers, contours = begun(scene, 200, build, workers)
+    effort, light = choose_effort(scene, Settings()), DirectLight([], Visibility(receivers.cells.corners), 0)
+    before, whole = (len(cut.cells) for cut in (receivers, contours.cut(receivers).receivers))
+    assert whole > 1.1 * before
+    for limit, cells in ((whole - 1, whole), (before, before)):
+        bends = Bends(receivers, limit, light, None, contours, effort, 0, workers)
+        assert len(bends._cut(0.0).cells) == cells
