@@ -14,7 +14,6 @@ from .clock import Clock
 from .contours import Contours
 from .cost import calibrate
 from .direct.illumination import DirectLight, Source
-from .direct.sources import sources
 from .memory import Memory
 from .parallel import Workers
 from .patch_count import patches_wanted
@@ -67,9 +66,7 @@ def bake(
             chosen = choose(scene, settings, pilot, effort)
             scene = chosen.scene
             space, around = unit_space(scene), scene.surroundings()
-            others, of_sky, sky = sources(
-                scene, around, space, sky_lights=chosen.active("sky lights"), portals=chosen.active("portals")
-            )
+            others, of_sky, sky = chosen.sources
             lights = [*others, *of_sky]
             if clock.progress.watched and lights:
                 show(*first_light(chosen, around, space, lights, settings, workers))

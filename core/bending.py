@@ -109,9 +109,9 @@ class Bends:
         """The triangles there are by now, cut along contours; least: as there, or more where there is no room."""
         self._last = self._contours.cut(self._uncut, least)
         if len(self._last.source) > _ABOUT * self._limit:
-            worth, pieces = self._last.worth, np.bincount(self._last.source, minlength=len(self._last.worth)) - 1
+            worth = self._last.worth
             by_worth = np.argsort(-worth, kind="stable")
-            fitting = np.count_nonzero(len(worth) + np.cumsum(pieces[by_worth]) <= _ABOUT * self._limit)
+            fitting = np.count_nonzero(len(worth) + np.cumsum(self._last.added[by_worth]) <= _ABOUT * self._limit)
             if fitting < len(worth):
                 least = _SAME * float(worth[by_worth[fitting]])
                 self._last = self._contours.cut(self._uncut, least)
@@ -161,7 +161,7 @@ class Bends:
         # While ever smaller errors are split: a cell is cut, or it is split and some of its quarters are cut, where the
         # contour crosses more sides.
         worth, crossed = self._last.worth / _CUT, self._last.crossed
-        pieces = np.maximum(np.bincount(self._last.source, minlength=len(worth)) - 1, crossed)
+        pieces = np.maximum(self._last.added, crossed)
         begin = np.concatenate([np.maximum(worth, squared), squared, np.minimum(worth / 4.0, squared)])
         more = np.concatenate([pieces, -pieces, pieces + crossed])
         order = np.argsort(-begin, kind="stable")

@@ -51,14 +51,7 @@ class Breaks:
         """Whether light breaks (n,) between points (2 n,) on two sides of n places."""
         ends = points.positions.reshape(2, -1, 3)
         keys = key(ends, points.normals[: ends.shape[1]])
-        known, (recalled,) = self._known.recall(keys)
-        broken = np.zeros(len(known), dtype=bool)
-        broken[known] = recalled > 0.0
-        if not known.all():
-            fresh = ~known
-            broken[fresh] = found = self._seen_between(points.only(np.tile(fresh, 2)))
-            self._known.remember(keys[fresh], [found])
-        return broken
+        return self._known.look_up(keys, lambda fresh: self._seen_between(points.only(np.tile(fresh, 2)))) > 0.0
 
     def _seen_between(self, points: Points) -> Bool:
         """The same where nothing is known yet."""
@@ -95,14 +88,8 @@ class Breaks:
         """The middles of cells (n,), and what is in sight (n,) of them."""
         middles = Points(receivers.cells, cell, np.full((len(cell), 3), 1 / 3))
         keys = key(middles.positions[None], middles.normals)
-        known, (recalled,) = self._known_middles.recall(keys)
-        sight = np.zeros(len(cell), dtype=np.int64)
-        sight[known] = recalled.astype(np.int64)
-        if not known.all():
-            fresh = ~known
-            sight[fresh] = found = self._sights.sight(middles.only(fresh), None)
-            self._known_middles.remember(keys[fresh], [found.astype(np.float64)])
-        return middles, sight
+        sight = self._known_middles.look_up(keys, lambda fresh: self._sights.sight(middles.only(fresh), None))
+        return middles, sight.astype(np.int64)
 
 
 def _part(one: Int64, other: Int64) -> Bool:

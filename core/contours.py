@@ -128,6 +128,11 @@ class Cut:
     worth: Float64
     crossed: Int64
 
+    @property
+    def added(self) -> Int64:
+        """(c,) how many cells more each of those there were before has become."""
+        return np.bincount(self.source, minlength=len(self.worth)) - 1
+
     @classmethod
     def none(cls, receivers: Receivers) -> Cut:
         count = len(receivers.cells)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -53,6 +53,16 @@ class Known:
         inside = at < len(self._keys)
         known[inside] = self._keys[at[inside]] == keys[inside]
         return known, self._found[:, at[known]]
+
+    def look_up(self, keys: Float64, find: Callable[[Bool], NDArray[Any]]) -> Float64:
+        """What is known (n,) at the keys (n,), of one column; where nothing is yet (n,), what is found there now."""
+        known, (recalled,) = self.recall(keys)
+        values = np.empty(len(keys))
+        values[known] = recalled
+        if not known.all():
+            values[~known] = found = find(~known)
+            self.remember(keys[~known], [found])
+        return values
 
     def remember(self, keys: Float64, found: Sequence[NDArray[Any]]) -> None:
         self._keys, first = np.unique(np.concatenate([self._keys, keys]), return_index=True)

@@ -85,18 +85,23 @@ class Pilot:
 
     def on_receivers(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64]:
         """Points (n, 3) spread at random over the receivers, and the normals (n, 3) there."""
-        corners, normals, area = self._receivers
-        chosen = rng.choice(len(corners), size=count, p=area / area.sum())
-        return _somewhere_in(corners[chosen], rng), normals[chosen]
+        corners, normals, _ = self._drawn(count, rng)
+        return _somewhere_in(corners, rng), normals
 
     def pairs_on_receivers(self, count: int, cells: int, rng: np.random.Generator) -> tuple[Float64, Float64, Float64]:
         """Pairs of points (n, 3), spread at random over the receivers, in one triangle each and no further from each
         other than they are in one of so many equal cells; and the normals (n, 3) there."""
-        corners, normals, area = self._receivers
-        chosen = rng.choice(len(corners), size=count, p=area / area.sum())
-        one, another = (_somewhere_in(corners[chosen], rng) for _ in range(2))
-        nearer = np.minimum(np.sqrt(area.sum() / cells / area[chosen]), 1.0)
-        return one, one + nearer[:, None] * (another - one), normals[chosen]
+        corners, normals, area = self._drawn(count, rng)
+        one, another = (_somewhere_in(corners, rng) for _ in range(2))
+        nearer = np.minimum(np.sqrt(self.receiving_areas.sum() / cells / area), 1.0)
+        return one, one + nearer[:, None] * (another - one), normals
+
+    def _drawn(self, count: int, rng: np.random.Generator) -> tuple[Float64, Float64, Float64]:
+        """Corners (n, 3, 3), normals and areas of triangles of the receivers, drawn at random by their areas."""
+        area = self.receiving_areas
+        chosen = rng.choice(len(area), size=count, p=area / area.sum())
+        corners, normals, area = (of_all[chosen] for of_all in self._receivers)
+        return corners, normals, area
 
     def where_hit(self, path: Path, rng: np.random.Generator) -> tuple[Float64, Float64]:
         """A point of each triangle that was hit, and its normal on that side; of rays that hit something."""

@@ -10,7 +10,7 @@ import numpy as np
 from .contrast import Contrast, contrast
 from .cost import Machine, Work, calibrate
 from .direct.emitters import emitting_pieces
-from .direct.illumination import MOST_ASKED, MOST_CONTOURED
+from .direct.illumination import MOST_ASKED, MOST_CONTOURED, Source
 from .direct.sky import split_bright
 from .direct.sources import sources
 from .effects import (
@@ -26,10 +26,12 @@ from .effects import (
 )
 from .form_factors.sides import SITES
 from .openings import find_openings
+from .patches import unit_space
 from .pilot import Pilot, look_for_sky
 from .result import Effect
 from .scene import Float64, Scene, SunLamp
 from .settings import Settings, asked_error
+from .sky import Sky
 from .tessellation import edge_for_count, predicted_count
 from .textures import varies
 from .unevenness import unevenness
@@ -155,6 +157,13 @@ class Plan:
         """Whether any effect needs rays over the hemisphere."""
         return self.effort.emitters_by_rays or any(self.active(name) for name in LOOKING)
 
+    @cached_property
+    def sources(self) -> tuple[list[Source], list[Source], Sky]:
+        """What light is asked for straight, and what is left to rays; see `direct.sources`."""
+        scene = self.scene
+        with_lights, with_portals = self.active("sky lights"), self.active("portals")
+        return sources(scene, scene.surroundings(), unit_space(scene), sky_lights=with_lights, portals=with_portals)
+
     def active(self, name: str) -> bool:
         """Whether an effect is simulated."""
         return next(effect.active for effect in self.effects if effect.name == name)
@@ -247,7 +256,7 @@ class _Prices:
 
     def __init__(self, chosen: Plan, settings: Settings, pilot: Pilot, machine: Machine) -> None:
         self._unpriced = chosen
-        self._pilot, self._looks = Pilot(chosen.scene), pilot
+        self._pilot = pilot
         self._settings = settings
         self._machine = machine
         self._own = sum(len(o.triangles) for o in chosen.scene.objects)
@@ -275,8 +284,8 @@ class _Prices:
         cut, and what the asked error calls for; else those there are, and more along its boundaries."""
         effort = planned.effort
         if effort.coarsest > 1.0:
-            coarse, cuts = self._coarse(effort), _CUT * self._contrast.crossed if self._lights_cut else 0.0
-            return coarse + min(cuts * coarse + self._called(effort), effort.triangles)
+            coarse = self._coarse(effort)
+            return coarse + min(_CUT * self._crossed * coarse + self._called(effort), effort.triangles)
         crossed = 0.01 / effort.error if self._settings.tessellate else min(0.01 / effort.error, _MOST_CROSSED)
         return planned.cells + min(crossed * planned.cells, effort.growth * effort.triangles)
 
@@ -328,18 +337,22 @@ class _Prices:
     @cached_property
     def _contrast(self) -> Contrast:
         """Of the light straight from lamps, emitting surfaces and what of the sky is asked for straight."""
-        chosen, scene = self._unpriced, self._unpriced.scene
-        others, of_sky, by_rays = sources(
-            scene,
-            scene.surroundings(),
-            self._looks.space,
-            sky_lights=chosen.active("sky lights"),
-            portals=chosen.active("portals"),
-        )
+        chosen = self._unpriced
+        others, of_sky, by_rays = chosen.sources
         other = (1.0 - self._machine.closed) * by_rays.mean_irradiance
         if chosen.effort.emitters_by_rays:
-            other += power_by_area(replace(scene, lamps=()))
-        return contrast(self._looks, [*others, *of_sky], chosen.effort.lights, other)
+            other += self._emitted
+        return contrast(self._pilot, [*others, *of_sky], chosen.effort.lights, other)
+
+    @property
+    def _crossed(self) -> float:
+        """Share of the cells that contours cross, if lights are so few that triangles are cut along their shadows."""
+        return self._contrast.crossed if self._lights_cut else 0.0
+
+    @property
+    def _emitted(self) -> float:
+        """About how much light of emitting surfaces falls on all surfaces, W/m^2."""
+        return power_by_area(replace(self._unpriced.scene, lamps=()))
 
     @property
     def _harshness(self) -> float:
@@ -352,7 +365,7 @@ class _Prices:
         scene = self._unpriced.scene
         suns = sum(float(np.mean(lamp.irradiance)) for lamp in scene.lamps if isinstance(lamp, SunLamp))
         open_air = (1.0 - self._machine.closed) * (np.pi * mean_of_sky(scene) + suns)
-        return unevenness(self._pilot, open_air + power_by_area(replace(scene, lamps=())))
+        return unevenness(self._pilot, scene.lamps, open_air + self._emitted)
 
     @cached_property
     def _own_areas(self) -> Float64:
@@ -412,7 +425,7 @@ class _Prices:
         looked_at = surveyed / BEND_PASSES
         fits = 1 + min(passes / effort.passes - 1.0, 1.0) + looked_at / max(cells, 1.0)
         contours = looked_at + cells * float(np.clip(rounds - 1.0, 0.0, 1.0))
-        crossing = self._contrast.crossed * contours if contours and self._lights_cut else 0.0
+        crossing = self._crossed * contours if contours else 0.0
         rest = Work(cells=cells, own=self._own, fits=fits, contours=contours, crossed=crossing, rounds=rounds)
         return {**works, REST: rest}
 

@@ -7,12 +7,14 @@ an area A: minimise the sum of |D2 L|^2 h^6 over triangles as wide as h for a gi
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from .direct.lamps import Light, place
 from .pilot import Pilot
 from .sampling import stream
-from .scene import Float64, SunLamp
+from .scene import Float64, Lamp, SunLamp
 
 #: Points where light is looked at: at most, at least, and those of all lamps together.
 _MOST, _FEWEST, _TOGETHER = 1024, 64, 1 << 15
@@ -20,13 +22,13 @@ _MOST, _FEWEST, _TOGETHER = 1024, 64, 1 << 15
 _CELLS = 750
 
 
-def unevenness(pilot: Pilot, other: float) -> float:
-    """(mean of |D2 L|^(2/3))^(3/2) A / 2 over the receivers of the light L of all lamps but suns, relative to the mean
+def unevenness(pilot: Pilot, lamps: Iterable[Lamp], other: float) -> float:
+    """(mean of |D2 L|^(2/3))^(3/2) A / 2 over the receivers of the light L of lamps but suns, relative to the mean
     of that and other light, W/m^2: a number. 0 where there is none.
 
     D2 L is taken along one direction at random at each of a thousand points, on triangles as flat as they are.
     """
-    lights = [place(lamp, pilot.space) for lamp in pilot.scene.lamps if not isinstance(lamp, SunLamp)]
+    lights = [place(lamp, pilot.space) for lamp in lamps if not isinstance(lamp, SunLamp)]
     area = float(pilot.receiving_areas.sum())
     if not lights or area == 0.0:
         return 0.0

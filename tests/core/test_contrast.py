@@ -13,8 +13,6 @@ from radiosity_baker.core.scene import AreaLamp, Scene, SunLamp
 #: Pairs that are looked at for one light, and how far apart they are in triangles that are half of all there is, by
 #: which they are moved together, as if in one of 750 cells.
 PAIRS, NEARER = 1024, np.sqrt(2 / 750)
-
-
 #: Where shadows begin and end along x.
 EDGES = np.linspace(-0.95, 0.95, 20)
 
@@ -66,7 +64,7 @@ def test_noise_is_no_contrast_whatever_its_colour(build):
     seen = []
     for power in ((10.0,) * 3, (30.0, 0.0, 0.0)):
         pilot, _ = striped(build)
-        lamp = AreaLamp("lamp", (0, 0, 2), (0, 0, -1), (0.4, 0, 0), (0, 0.4, 0), power)
+        lamp = AreaLamp("lamp", (0, 0, 2), (0.4, 0, 0), (0, 0.4, 0), (0, 0, -1), power)
         seen.append(contrast(pilot, [place(lamp, pilot.space)], 16, 0.0).light)
     assert seen[0] > 0.0
     assert seen[1] == pytest.approx(seen[0])

@@ -325,7 +325,7 @@ def test_pools_count_beside_all_other_light(build, monkeypatch):
     """As much as comes from emitting surfaces, and from the sky and suns where rays leave: half of them do."""
     told = []
     monkeypatch.setattr("radiosity_baker.core.plan.calibrate", lambda *_: Machine(3e-7, 1e-8, 0.5, 1))
-    monkeypatch.setattr("radiosity_baker.core.plan.unevenness", lambda _, other: told.append(other) or 0.0)
+    monkeypatch.setattr("radiosity_baker.core.plan.unevenness", lambda _pilot, _lamps, other: told.append(other) or 0.0)
     lamp, sun = PointLamp("lamp", (0, 0, 1), (1.0,) * 3), SunLamp("sun", (0, 0, -1), (2.0,) * 3)
     shining = replace(build.grey, emission=(3.0,) * 3)
     panel = replace(build.quad("panel", (-0.5, -0.5, 2), (0, 1, 0), (1, 0, 0)), surface=np.ones(2, dtype=np.int32))
